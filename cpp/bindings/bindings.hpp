@@ -1,0 +1,17 @@
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+namespace graspatlas {
+
+using DoubleArray = pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast>;
+
+/// Pointer to the numbers of a one-dimensional array of this size; an Error that names it otherwise.
+const double* checked_vector(const DoubleArray& array, pybind11::ssize_t size, const char* name);
+
+void bind_continuation(pybind11::module_& module);
+void bind_grasp(pybind11::module_& module);
+void bind_quality(pybind11::module_& module);
+
+}  // namespace graspatlas

@@ -1,0 +1,26 @@
+#include <string>
+
+#include "bindings.hpp"
+#include "graspatlas/continuation/system.hpp"
+
+namespace graspatlas {
+
+const double* checked_vector(const DoubleArray& array, pybind11::ssize_t size, const char* name) {
+  if (array.ndim() != 1 || array.shape(0) != size) {
+    std::string shape;
+    for (pybind11::ssize_t i = 0; i < array.ndim(); ++i) shape += (i ? ", " : "") + std::to_string(array.shape(i));
+    throw Error(std::string(name) + " must hold " + std::to_string(size) + " numbers in one dimension; its shape is (" +
+                shape + ")");
+  }
+  return array.data();
+}
+
+}  // namespace graspatlas
+
+PYBIND11_MODULE(_core, module) {
+  module.doc() = "Compiled core of graspatlas: continuation, grasp systems and quality indices.";
+  pybind11::register_exception<graspatlas::Error>(module, "GraspAtlasError", PyExc_ValueError);
+  graspatlas::bind_continuation(module);
+  graspatlas::bind_grasp(module);
+  graspatlas::bind_quality(module);
+}

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <vector>
+
+namespace graspatlas {
+
+/// LU factorisation with partial pivoting of one square matrix after another of the same small size.
+///
+/// Matrices of 10 to 40 rows are factorised millions of times, so the storage is kept and rows are contiguous.
+class LinearSolver {
+ public:
+  explicit LinearSolver(int size);
+
+  /// Row i of the matrix to factorise next; fill all rows, then call factorize().
+  double* row(int i) { return &storage_[static_cast<std::size_t>(i) * stride_]; }
+
+  /// False when the matrix is singular to working precision, relative to its largest entry.
+  bool factorize();
+
+  /// Solve A y = b in place with the last factorisation.
+  void solve(double* b) const;
+
+ private:
+  int size_, stride_;
+  std::vector<double> storage_;
+  std::vector<double*> rows_;   // rows in pivoted order
+  std::vector<int> origin_;     // origin_[i]: index of the original row that stands at i
+  mutable std::vector<double> permuted_;
+};
+
+}  // namespace graspatlas

@@ -1,0 +1,173 @@
+#include "graspatlas/continuation/neighbours.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace graspatlas {
+
+namespace {
+// A child that holds more than this share of its parent's points (and some more) makes the parent be rebuilt.
+constexpr double kLopsided = 0.7;
+}  // namespace
+
+Neighbours::Neighbours(int size) : size_(size) {}
+
+int Neighbours::new_node() {
+  if (free_nodes_.empty()) {
+    nodes_.emplace_back();
+    return static_cast<int>(nodes_.size()) - 1;
+  }
+  const int node = free_nodes_.back();
+  free_nodes_.pop_back();
+  nodes_[node] = Node();
+  return node;
+}
+
+int Neighbours::new_bucket() {
+  if (free_buckets_.empty()) {
+    points_.resize(points_.size() + static_cast<std::size_t>(kBucket) * size_);
+    numbers_.resize(numbers_.size() + kBucket);
+    return static_cast<int>(numbers_.size()) / kBucket - 1;
+  }
+  const int bucket = free_buckets_.back();
+  free_buckets_.pop_back();
+  return bucket;
+}
+
+void Neighbours::insert(const double* point) {
+  const int number = count_++;
+  if (root_ < 0) {
+    root_ = new_node();
+    nodes_[root_].bucket = new_bucket();
+  }
+  int node = root_, parent = -1;
+  // Highest node that this insertion makes lopsided, and its parent; a full leaf at the end is split the same way.
+  int lopsided = -1, lopsided_parent = -1;
+  while (nodes_[node].axis >= 0) {
+    Node& n = nodes_[node];
+    ++n.count;
+    const int child = point[n.axis] < n.split ? n.left : n.right;
+    if (lopsided < 0 && nodes_[child].count + 1 > kLopsided * n.count + kBucket) {
+      lopsided = node;
+      lopsided_parent = parent;
+    }
+    parent = node;
+    node = child;
+  }
+  if (lopsided < 0 && nodes_[node].count == kBucket) {
+    lopsided = node;
+    lopsided_parent = parent;
+  }
+  if (lopsided < 0) {
+    Node& leaf = nodes_[node];
+    std::copy_n(point, size_, bucket_point(leaf.bucket, leaf.count));
+    numbers_[static_cast<std::size_t>(leaf.bucket) * kBucket + leaf.count] = number;
+    ++leaf.count;
+    return;
+  }
+  const int replacement = rebuild(lopsided, point);
+  if (lopsided_parent < 0)
+    root_ = replacement;
+  else
+    (nodes_[lopsided_parent].left == lopsided ? nodes_[lopsided_parent].left : nodes_[lopsided_parent].right) =
+        replacement;
+}
+
+int Neighbours::rebuild(int node, const double* point) {
+  std::vector<int> numbers;
+  std::vector<double> points;
+  collect(node, numbers, points);
+  numbers.push_back(count_ - 1);
+  points.insert(points.end(), point, point + size_);
+  std::vector<Item> items(numbers.size());
+  for (std::size_t i = 0; i < items.size(); ++i) items[i] = {numbers[i], &points[i * size_]};
+  return build(items.data(), items.data() + items.size());
+}
+
+void Neighbours::collect(int node, std::vector<int>& numbers, std::vector<double>& points) {
+  const Node n = nodes_[node];
+  if (n.axis < 0) {
+    for (int i = 0; i < n.count; ++i) {
+      numbers.push_back(numbers_[static_cast<std::size_t>(n.bucket) * kBucket + i]);
+      points.insert(points.end(), bucket_point(n.bucket, i), bucket_point(n.bucket, i) + size_);
+    }
+    free_buckets_.push_back(n.bucket);
+  } else {
+    collect(n.left, numbers, points);
+    collect(n.right, numbers, points);
+  }
+  free_nodes_.push_back(node);
+}
+
+int Neighbours::build(Item* first, Item* last) {
+  const int node = new_node();
+  const int count = static_cast<int>(last - first);
+  nodes_[node].count = count;
+  if (count <= kBucket) {
+    const int bucket = new_bucket();
+    nodes_[node].bucket = bucket;
+    for (int i = 0; i < count; ++i) {
+      std::copy_n(first[i].point, size_, bucket_point(bucket, i));
+      numbers_[static_cast<std::size_t>(bucket) * kBucket + i] = first[i].number;
+    }
+    return node;
+  }
+  int axis = 0;
+  double widest = -1.0;
+  for (int c = 0; c < size_; ++c) {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (Item* item = first; item != last; ++item) {
+      low = std::min(low, item->point[c]);
+      high = std::max(high, item->point[c]);
+    }
+    if (high - low > widest) {
+      widest = high - low;
+      axis = c;
+    }
+  }
+  Item* middle = first + count / 2;
+  std::nth_element(first, middle, last, [axis](const Item& a, const Item& b) {
+    return a.point[axis] < b.point[axis] || (a.point[axis] == b.point[axis] && a.number < b.number);
+  });
+  const double split = middle->point[axis];
+  const int left = build(first, middle), right = build(middle, last);
+  nodes_[node].axis = axis;
+  nodes_[node].split = split;
+  nodes_[node].left = left;
+  nodes_[node].right = right;
+  return node;
+}
+
+void Neighbours::within(const double* point, double distance, std::vector<int>& out) const {
+  out.clear();
+  if (root_ < 0) return;
+  thread_local std::vector<double> offsets;
+  offsets.assign(size_, 0.0);
+  search(root_, point, 0.0, offsets, distance * distance, out);
+  std::sort(out.begin(), out.end());
+}
+
+void Neighbours::search(int node, const double* point, double squared_to_cell, std::vector<double>& offsets,
+                        double squared, std::vector<int>& out) const {
+  const Node& n = nodes_[node];
+  if (n.axis < 0) {
+    for (int i = 0; i < n.count; ++i) {
+      const double* other = bucket_point(n.bucket, i);
+      double sum = 0.0;
+      for (int c = 0; c < size_; ++c) sum += (other[c] - point[c]) * (other[c] - point[c]);
+      if (sum <= squared) out.push_back(numbers_[static_cast<std::size_t>(n.bucket) * kBucket + i]);
+    }
+    return;
+  }
+  // Points equal to the split may lie on either side, so both sides are visited when the offset is zero.
+  const double offset = point[n.axis] - n.split;
+  search(offset < 0.0 ? n.left : n.right, point, squared_to_cell, offsets, squared, out);
+  const double old = offsets[n.axis];
+  const double farther = squared_to_cell - old * old + offset * offset;
+  if (farther > squared) return;
+  offsets[n.axis] = offset;
+  search(offset < 0.0 ? n.right : n.left, point, farther, offsets, squared, out);
+  offsets[n.axis] = old;
+}
+
+}  // namespace graspatlas

@@ -1,0 +1,131 @@
+#include "graspatlas/continuation/newton.hpp"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+namespace graspatlas {
+
+namespace {
+
+// Below this residual the Jacobian just factorised is accurate enough to give the last step and the tangent basis.
+constexpr double kNearlyZero = 1e-6;
+// A Jacobian whose smallest singular value is this far below its largest has lost rank.
+constexpr double kRankTolerance = 1e-9;
+
+double largest_entry(const std::vector<double>& R) {
+  double largest = 0.0;
+  for (double r : R) {
+    if (!std::isfinite(r)) return HUGE_VAL;
+    largest = std::max(largest, std::abs(r));
+  }
+  return largest;
+}
+
+}  // namespace
+
+Newton::Newton(System& system, NewtonOptions options)
+    : system_(system),
+      options_(options),
+      solver_(system.tangent_size()),
+      R_(system.equation_count()),
+      J_(static_cast<std::size_t>(system.equation_count()) * system.tangent_size()),
+      step_(system.tangent_size()) {}
+
+bool Newton::factorize(const double* Phi) {
+  const int n = system_.tangent_size(), equations = system_.equation_count();
+  for (int i = 0; i < equations; ++i) std::copy_n(&J_[static_cast<std::size_t>(i) * n], n, solver_.row(i));
+  for (int i = equations; i < n; ++i) std::copy_n(Phi + static_cast<std::size_t>(i - equations) * n, n, solver_.row(i));
+  return solver_.factorize();
+}
+
+double Newton::evaluate_residual(const double* x) {
+  system_.residual(x, R_.data());
+  return largest_entry(R_);
+}
+
+Projection Newton::project(double* x, const double* Phi) {
+  const int n = system_.tangent_size();
+  bool refreshed = true;
+  double previous = HUGE_VAL;
+  for (int iteration = 0; iteration <= options_.max_iterations; ++iteration) {
+    // Quadratic convergence: once nearly zero, the last factorisation finishes the work and a residual suffices.
+    if (refreshed) {
+      system_.linearize(x, R_.data(), J_.data());
+      residual_ = largest_entry(R_);
+      if (!std::isfinite(residual_)) return Projection::not_converged;
+      if (!factorize(Phi)) return Projection::singular;
+    } else {
+      residual_ = evaluate_residual(x);
+      if (!std::isfinite(residual_)) return Projection::not_converged;
+    }
+    if (residual_ <= options_.tolerance) return Projection::converged;
+    if (!refreshed && residual_ > 0.1 * previous) return Projection::not_converged;
+    if (iteration >= 2 && refreshed && residual_ > 10.0 * previous) return Projection::not_converged;
+    previous = residual_;
+    refreshed = refreshed && residual_ > kNearlyZero;
+    std::transform(R_.begin(), R_.end(), step_.begin(), [](double r) { return -r; });
+    std::fill(step_.begin() + static_cast<long>(R_.size()), step_.end(), 0.0);
+    solver_.solve(step_.data());
+    double length = 0.0;
+    for (int i = 0; i < n; ++i) length += step_[i] * step_[i];
+    if (!std::isfinite(length)) return Projection::not_converged;
+    system_.integrate(x, step_.data(), x);
+  }
+  return Projection::not_converged;
+}
+
+bool Newton::tangent_basis(double* Phi) const {
+  const int n = system_.tangent_size(), k = system_.dimension(), equations = system_.equation_count();
+  for (int i = 0; i < k; ++i) {
+    double* row = Phi + static_cast<std::size_t>(i) * n;
+    std::fill_n(row, n, 0.0);
+    row[equations + i] = 1.0;
+    solver_.solve(row);
+    // Gram-Schmidt, twice for orthogonality to working precision.
+    for (int pass = 0; pass < 2; ++pass)
+      for (int j = 0; j < i; ++j) {
+        const double* other = Phi + static_cast<std::size_t>(j) * n;
+        double dot = 0.0;
+        for (int c = 0; c < n; ++c) dot += row[c] * other[c];
+        for (int c = 0; c < n; ++c) row[c] -= dot * other[c];
+      }
+    double squared = 0.0;
+    for (int c = 0; c < n; ++c) squared += row[c] * row[c];
+    if (!(squared > 1e-20) || !std::isfinite(squared)) return false;
+    const double inverse = 1.0 / std::sqrt(squared);
+    for (int c = 0; c < n; ++c) row[c] *= inverse;
+  }
+  return true;
+}
+
+Projection Newton::project_freely(double* x, double* Phi) {
+  const int n = system_.tangent_size(), equations = system_.equation_count(), k = system_.dimension();
+  Eigen::Map<RowMatrix> basis(Phi, k, n);
+  if (equations == 0) {
+    basis.setIdentity();
+    residual_ = 0.0;
+    return Projection::converged;
+  }
+  for (int iteration = 0; iteration <= options_.max_iterations; ++iteration) {
+    system_.linearize(x, R_.data(), J_.data());
+    residual_ = largest_entry(R_);
+    if (!std::isfinite(residual_)) return Projection::not_converged;
+    const Eigen::Map<const RowMatrix> J(J_.data(), equations, n);
+    if (!J.allFinite()) return Projection::not_converged;
+    const Eigen::JacobiSVD<Matrix> svd(Matrix(J), Eigen::ComputeFullU | Eigen::ComputeFullV);
+    const auto& s = svd.singularValues();
+    if (!(s(equations - 1) > kRankTolerance * s(0))) return Projection::singular;
+    if (residual_ <= options_.tolerance) {
+      basis = svd.matrixV().rightCols(k).transpose();
+      return Projection::converged;
+    }
+    const Eigen::Map<const Vector> R(R_.data(), equations);
+    const Vector d = -(svd.matrixV().leftCols(equations) *
+                       ((svd.matrixU().transpose() * R).array() / s.array()).matrix());
+    system_.integrate(x, d.data(), x);
+  }
+  return Projection::not_converged;
+}
+
+}  // namespace graspatlas

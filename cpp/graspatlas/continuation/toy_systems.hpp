@@ -1,0 +1,48 @@
+#pragma once
+
+#include "graspatlas/continuation/system.hpp"
+
+namespace graspatlas {
+
+/// The unit sphere |x|^2 = 1 in R^n: dimension n - 1.
+class Sphere : public System {
+ public:
+  explicit Sphere(int n);
+  void residual(const double* x, double* R) override;
+  void linearize(const double* x, double* R, double* J) override;
+};
+
+/// The torus (sqrt(x^2 + y^2) - major)^2 + z^2 = minor^2 in R^3.
+class Torus : public System {
+ public:
+  Torus(double major_radius, double minor_radius);
+  void residual(const double* x, double* R) override;
+  void linearize(const double* x, double* R, double* J) override;
+
+ private:
+  double major_, minor_;
+};
+
+/// n angles and no equation: a flat torus of dimension n. Angles lie in [-pi, pi).
+class Angles : public System {
+ public:
+  explicit Angles(int n);
+  void residual(const double*, double*) override {}
+  void linearize(const double*, double*, double*) override {}
+  void integrate(const double* x, const double* v, double* out) const override;
+  void difference(const double* x0, const double* x1, double* out) const override;
+  void embed(const double* x, double* out) const override;
+};
+
+/// All rotations and no equation: SO(3) as unit quaternions (x, y, z, w), tangent vectors are body rotation vectors.
+class Rotations : public System {
+ public:
+  Rotations();
+  void residual(const double*, double*) override {}
+  void linearize(const double*, double*, double*) override {}
+  void integrate(const double* x, const double* v, double* out) const override;
+  void difference(const double* x0, const double* x1, double* out) const override;
+  void embed(const double* x, double* out) const override;
+};
+
+}  // namespace graspatlas

@@ -1,0 +1,359 @@
+#include "graspatlas/grasp/grasp_system.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "graspatlas/continuation/angle.hpp"
+
+namespace graspatlas {
+
+namespace {
+
+constexpr int kEquations = 5;  // of one contact
+
+int object_v_size(const Model& model) { return model.v_size() - model.hand_v_size(); }
+
+// Tangent coordinates of the object that are lengths: x, y, z of a free flyer; x, y of a planar joint.
+int object_lengths(const Model& model) {
+  return model.object_kind() == ObjectJoint::free_flyer ? 3 : model.object_kind() == ObjectJoint::planar ? 2 : 0;
+}
+
+int object_embedding(const Model& model) {
+  return model.object_kind() == ObjectJoint::free_flyer ? 12 : model.object_kind() == ObjectJoint::planar ? 4 : 0;
+}
+
+// Numbers of q that may be compared one by one: all but quaternions, whose negatives are the same.
+bool comparable(const JointInfo& joint) { return joint.q_size == joint.v_size || joint.q_size == 2; }
+
+template <class Visit>
+void visit_sides(const std::vector<Contact>& contacts, Visit visit) {
+  for (const Contact& contact : contacts) {
+    visit(contact.hand);
+    visit(contact.object);
+  }
+}
+
+}  // namespace
+
+int GraspSystem::count_free(const std::vector<Contact>& contacts) {
+  int count = 0;
+  visit_sides(contacts, [&](const ContactSide& side) { count += side.u.free + side.v.free; });
+  return count;
+}
+
+int GraspSystem::embedding_size(const Model& model, const std::vector<Contact>& contacts, int motions) {
+  int size = object_embedding(model);
+  if (model.hand_is_euclidean()) {
+    size += motions;
+  } else {
+    for (const JointInfo& joint : model.hand_joints()) size += comparable(joint) ? joint.q_size : 0;
+  }
+  visit_sides(contacts, [&](const ContactSide& side) {
+    size += side.u.free ? 1 + side.patch->u_is_angle() : 0;
+    size += side.v.free;
+  });
+  return size;
+}
+
+GraspSystem::GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> contacts, const Matrix& motions,
+                         double length_scale, const std::vector<double>& lower, const std::vector<double>& upper)
+    : System(model->q_size() + count_free(contacts),
+             static_cast<int>(motions.cols()) + graspatlas::object_v_size(*model) + count_free(contacts),
+             kEquations * static_cast<int>(contacts.size()),
+             embedding_size(*model, contacts, static_cast<int>(motions.cols()))),
+      model_(std::move(model)),
+      contacts_(std::move(contacts)),
+      motions_(motions),
+      all_motions_(motions.rows() == motions.cols() && motions.isIdentity(0.0)),
+      motion_count_(static_cast<int>(motions.cols())),
+      object_v_size_(graspatlas::object_v_size(*model_)),
+      length_scale_(length_scale),
+      velocity_(model_->v_size()) {
+  if (motions.rows() != model_->hand_v_size())
+    throw Error("the hand motions have " + std::to_string(motions.rows()) + " rows, the hand has " +
+                std::to_string(model_->hand_v_size()) + " joint velocities");
+  if (!(length_scale > 0.0) || !std::isfinite(length_scale))
+    throw Error("length_scale must be positive, got " + std::to_string(length_scale));
+  visit_sides(contacts_, [&](const ContactSide& side) {
+    if (side.u.free) parameters_.push_back({&side.u, side.patch->u_is_angle()});
+    if (side.v.free) parameters_.push_back({&side.v, false});
+  });
+  add_joint_bounds(lower, upper);
+  add_parameter_bounds();
+  RowMatrix B = RowMatrix::Zero(static_cast<Eigen::Index>(bounds_.size()), tangent_size());
+  for (std::size_t i = 0; i < bounds_.size(); ++i) {
+    const Bound& bound = bounds_[i];
+    const auto row = static_cast<Eigen::Index>(i);
+    if (bound.joint)
+      B.row(row).head(motion_count_) = bound.sign * motions_.row(bound.index);
+    else
+      B(row, motion_count_ + object_v_size_ + bound.index) = bound.sign;
+  }
+  // From here a joint's bound reads q, which equals its place among the velocities only in a Euclidean hand.
+  for (Bound& bound : bounds_)
+    if (bound.joint)
+      for (const JointInfo& joint : model_->hand_joints())
+        if (joint.v_index == bound.index && joint.v_size == 1) {
+          bound.index = joint.q_index;
+          break;
+        }
+  set_bound_normals(B);
+}
+
+void GraspSystem::add_joint_bounds(const std::vector<double>& lower, const std::vector<double>& upper) {
+  if (static_cast<int>(lower.size()) != model_->hand_q_size() || lower.size() != upper.size())
+    throw Error("joint limits must hold " + std::to_string(model_->hand_q_size()) + " numbers");
+  for (const JointInfo& joint : model_->hand_joints()) {
+    if (joint.q_size != 1) continue;
+    const double low = lower[joint.q_index], high = upper[joint.q_index];
+    if (!(low <= high))
+      throw Error("joint '" + joint.name + "' has limits [" + std::to_string(low) + ", " + std::to_string(high) + "]");
+    const auto add = [&](double sign, double limit, const char* side) {
+      bounds_.push_back({true, joint.v_index, sign, limit, 1.0});
+      bound_names_.push_back(std::string(side) + " limit of joint '" + joint.name + "'");
+    };
+    // A joint that no kept motion moves stays where x1 has it.
+    if (motions_.row(joint.v_index).norm() < 1e-12) continue;
+    if (std::isfinite(high)) add(1.0, high, "upper");
+    if (std::isfinite(low)) add(-1.0, -low, "lower");
+  }
+}
+
+void GraspSystem::add_parameter_bounds() {
+  for (std::size_t i = 0; i < parameters_.size(); ++i) {
+    const PatchParameter& parameter = *parameters_[i].parameter;
+    if (parameter.periodic) continue;
+    const double scale = parameters_[i].angle ? 1.0 : length_scale_;
+    const auto add = [&](double sign, double limit, const char* side) {
+      if (!std::isfinite(limit)) return;
+      bounds_.push_back({false, static_cast<int>(i), sign, limit, scale});
+      bound_names_.push_back(std::string(side) + " end of patch parameter " + std::to_string(i));
+    };
+    add(1.0, parameter.upper, "upper");
+    add(-1.0, -parameter.lower, "lower");
+  }
+}
+
+void GraspSystem::place_side(const ContactSide& side, const double*& w, SideState& out) const {
+  const double u = side.u.free ? *w++ : side.u.value;
+  const double v = side.v.free ? *w++ : side.v.value;
+  side.patch->evaluate(u, v, out.local);
+  const Placement& joint = model_->placement(side.joint);
+  out.rotation.noalias() = joint.rotation * side.frame.rotation;
+  const Eigen::Vector3d in_joint = side.frame.rotation * out.local.o + side.frame.translation;
+  out.point.noalias() = joint.rotation * in_joint + joint.translation;
+}
+
+void GraspSystem::contact_residual(const SideState& hand, const SideState& object, double* R) const {
+  const Eigen::Vector3d gap = (hand.point - object.point) / length_scale_;
+  const Eigen::Vector3d m = object.rotation * object.local.m;
+  R[0] = gap.x();
+  R[1] = gap.y();
+  R[2] = gap.z();
+  R[3] = m.dot(hand.rotation * hand.local.a);
+  R[4] = m.dot(hand.rotation * hand.local.b);
+}
+
+void GraspSystem::residual(const double* x, double* R) {
+  model_->update(x, false);
+  const double* w = x + model_->q_size();
+  SideState hand, object;
+  for (const Contact& contact : contacts_) {
+    place_side(contact.hand, w, hand);
+    place_side(contact.object, w, object);
+    contact_residual(hand, object, R);
+    R += kEquations;
+  }
+}
+
+// Column of the model's tangent coordinate v in the five rows of one contact, given the side's contact point.
+void GraspSystem::add_column(int v, double sign, const Eigen::Vector3d& point, const Eigen::Vector3d& a_cross_m,
+                             const Eigen::Vector3d& b_cross_m, double* J) const {
+  const double* velocity = model_->velocity(v);
+  const Eigen::Map<const Eigen::Vector3d> linear(velocity), angular(velocity + 3);
+  const Eigen::Vector3d moved = (sign / length_scale_) * (linear + angular.cross(point));
+  const double entries[kEquations] = {moved.x(), moved.y(), moved.z(), sign * angular.dot(a_cross_m),
+                                      sign * angular.dot(b_cross_m)};
+  const int n = tangent_size(), hand_v_size = model_->hand_v_size();
+  if (v < hand_v_size && !all_motions_) {
+    const double* motion = motions_.data() + static_cast<std::ptrdiff_t>(v) * motion_count_;
+    for (int e = 0; e < kEquations; ++e) {
+      double* __restrict row = J + static_cast<std::ptrdiff_t>(e) * n;
+      for (int c = 0; c < motion_count_; ++c) row[c] += entries[e] * motion[c];
+    }
+    return;
+  }
+  const int object_v = v - hand_v_size;
+  const int column = v < hand_v_size ? v : motion_count_ + object_v;
+  const double scale = object_v >= 0 && object_v < object_lengths(*model_) ? length_scale_ : 1.0;
+  for (int e = 0; e < kEquations; ++e) J[static_cast<std::ptrdiff_t>(e) * n + column] += scale * entries[e];
+}
+
+void GraspSystem::linearize(const double* x, double* R, double* J) {
+  model_->update(x, true);
+  const int n = tangent_size();
+  std::fill_n(J, static_cast<std::size_t>(equation_count()) * n, 0.0);
+  const double* w = x + model_->q_size();
+  int column = motion_count_ + object_v_size_;
+  SideState hand, object;
+  for (const Contact& contact : contacts_) {
+    place_side(contact.hand, w, hand);
+    place_side(contact.object, w, object);
+    contact_residual(hand, object, R);
+    const Eigen::Vector3d m = object.rotation * object.local.m;
+    const Eigen::Vector3d a = hand.rotation * hand.local.a, b = hand.rotation * hand.local.b;
+    const Eigen::Vector3d a_cross_m = a.cross(m), b_cross_m = b.cross(m);
+    for (int v : model_->support(contact.hand.joint)) add_column(v, 1.0, hand.point, a_cross_m, b_cross_m, J);
+    for (int v : model_->support(contact.object.joint)) add_column(v, -1.0, object.point, a_cross_m, b_cross_m, J);
+
+    // Free parameters: u and v of the hand's patch, then of the object's; lengths are in units of length_scale.
+    const auto fill = [&](double dx, double dy, double dz, double da, double db) {
+      const double entries[kEquations] = {dx, dy, dz, da, db};
+      for (int e = 0; e < kEquations; ++e) J[static_cast<std::ptrdiff_t>(e) * n + column] = entries[e];
+      ++column;
+    };
+    const auto hand_column = [&](const Eigen::Vector3d& o_w, const Eigen::Vector3d& a_w, const Eigen::Vector3d& b_w,
+                                 double scale) {
+      const Eigen::Vector3d d = hand.rotation * o_w * (scale / length_scale_);
+      fill(d.x(), d.y(), d.z(), scale * m.dot(hand.rotation * a_w), scale * m.dot(hand.rotation * b_w));
+    };
+    const auto object_column = [&](const Eigen::Vector3d& o_w, const Eigen::Vector3d& m_w, double scale) {
+      const Eigen::Vector3d d = object.rotation * o_w * (-scale / length_scale_);
+      const Eigen::Vector3d dm = scale * (object.rotation * m_w);
+      fill(d.x(), d.y(), d.z(), a.dot(dm), b.dot(dm));
+    };
+    const double hand_u_scale = contact.hand.patch->u_is_angle() ? 1.0 : length_scale_;
+    const double object_u_scale = contact.object.patch->u_is_angle() ? 1.0 : length_scale_;
+    if (contact.hand.u.free) hand_column(hand.local.o_u, hand.local.a_u, hand.local.b_u, hand_u_scale);
+    if (contact.hand.v.free) hand_column(hand.local.o_v, hand.local.a_v, hand.local.b_v, length_scale_);
+    if (contact.object.u.free) object_column(object.local.o_u, object.local.m_u, object_u_scale);
+    if (contact.object.v.free) object_column(object.local.o_v, object.local.m_v, length_scale_);
+    R += kEquations;
+    J += static_cast<std::ptrdiff_t>(kEquations) * n;
+  }
+}
+
+void GraspSystem::integrate(const double* x, const double* v, double* out) const {
+  const int hand_v_size = model_->hand_v_size();
+  for (int i = 0; i < hand_v_size; ++i) {
+    double sum = 0.0;
+    if (all_motions_)
+      sum = v[i];
+    else
+      for (int c = 0; c < motion_count_; ++c) sum += motions_(i, c) * v[c];
+    velocity_[i] = sum;
+  }
+  const int lengths = object_lengths(*model_);
+  for (int i = 0; i < object_v_size_; ++i)
+    velocity_[hand_v_size + i] = v[motion_count_ + i] * (i < lengths ? length_scale_ : 1.0);
+  model_->integrate(x, velocity_.data(), out);
+  const double* v_w = v + motion_count_ + object_v_size_;
+  for (int i = 0; i < parameter_count(); ++i) {
+    const int at = model_->q_size() + i;
+    out[at] = parameters_[i].angle ? x[at] + v_w[i] : x[at] + length_scale_ * v_w[i];
+    if (parameters_[i].parameter->periodic) out[at] = wrap_angle(out[at]);
+  }
+}
+
+void GraspSystem::difference(const double* x0, const double* x1, double* out) const {
+  model_->difference(x0, x1, velocity_.data());
+  const int hand_v_size = model_->hand_v_size();
+  if (all_motions_) {
+    std::copy_n(velocity_.data(), hand_v_size, out);
+  } else {
+    std::fill_n(out, motion_count_, 0.0);
+    for (int i = 0; i < hand_v_size; ++i)
+      for (int c = 0; c < motion_count_; ++c) out[c] += motions_(i, c) * velocity_[i];
+  }
+  const int lengths = object_lengths(*model_);
+  for (int i = 0; i < object_v_size_; ++i)
+    out[motion_count_ + i] = velocity_[hand_v_size + i] / (i < lengths ? length_scale_ : 1.0);
+  double* out_w = out + motion_count_ + object_v_size_;
+  for (int i = 0; i < parameter_count(); ++i) {
+    const int at = model_->q_size() + i;
+    const double d = x1[at] - x0[at];
+    out_w[i] = parameters_[i].parameter->periodic ? wrap_angle(d) : parameters_[i].angle ? d : d / length_scale_;
+  }
+}
+
+void GraspSystem::embed(const double* x, double* out) const {
+  if (model_->hand_is_euclidean()) {
+    std::fill_n(out, motion_count_, 0.0);
+    for (int i = 0; i < model_->hand_v_size(); ++i)
+      for (int c = 0; c < motion_count_; ++c) out[c] += motions_(i, c) * x[i];
+    out += motion_count_;
+  } else {
+    for (const JointInfo& joint : model_->hand_joints())
+      if (comparable(joint)) out = std::copy_n(x + joint.q_index, joint.q_size, out);
+  }
+  const double* object = x + model_->hand_q_size();
+  const int lengths = object_lengths(*model_);
+  for (int i = 0; i < lengths; ++i) *out++ = object[i] / length_scale_;
+  if (model_->object_kind() == ObjectJoint::free_flyer) {
+    // |R1 - R0| in the Frobenius norm is 2 sqrt(2) sin(angle / 2), at most sqrt(2) times the angle.
+    const Eigen::Map<const Eigen::Quaterniond> quaternion(object + 3);
+    Eigen::Map<Eigen::Matrix3d>{out} = quaternion.toRotationMatrix() * M_SQRT1_2;
+    out += 9;
+  } else if (model_->object_kind() == ObjectJoint::planar) {
+    out = std::copy_n(object + 2, 2, out);
+  }
+  for (int i = 0; i < parameter_count(); ++i) {
+    const double value = x[model_->q_size() + i];
+    if (parameters_[i].angle) {
+      *out++ = std::cos(value);
+      *out++ = std::sin(value);
+    } else {
+      *out++ = value / length_scale_;
+    }
+  }
+}
+
+void GraspSystem::slack(const double* x, double* out) const {
+  for (const Bound& bound : bounds_) {
+    const double value = bound.joint ? x[bound.index] : x[model_->q_size() + bound.index];
+    *out++ = (bound.limit - bound.sign * value) / bound.scale;
+  }
+}
+
+void GraspSystem::contact_points(const double* x, ContactPoint* out) {
+  model_->update(x, false);
+  const double* w = x + model_->q_size();
+  SideState hand, object;
+  for (const Contact& contact : contacts_) {
+    place_side(contact.hand, w, hand);
+    place_side(contact.object, w, object);
+    *out++ = {hand.point, object.point, hand.rotation * hand.local.m, object.rotation * object.local.m};
+  }
+}
+
+int GraspSystem::object_dof() const { return object_v_size_; }
+
+void GraspSystem::grasp_matrices(const double* x, Eigen::Ref<RowMatrix> J, Eigen::Ref<RowMatrix> Gt) {
+  model_->update(x, true);
+  J.setZero();
+  Gt.setZero();
+  const double* w = x + model_->q_size();
+  const Eigen::Vector3d origin = model_->placement(model_->object_joint()).translation;
+  SideState hand, object;
+  Eigen::Index row = 0;
+  for (const Contact& contact : contacts_) {
+    place_side(contact.hand, w, hand);
+    place_side(contact.object, w, object);
+    for (int v : model_->support(contact.hand.joint)) {
+      const Eigen::Map<const Eigen::Vector3d> linear(model_->velocity(v)), angular(model_->velocity(v) + 3);
+      J.block<3, 1>(row, v) = linear + angular.cross(hand.point);
+    }
+    const Eigen::Vector3d arm = object.point - origin;
+    if (model_->object_kind() == ObjectJoint::free_flyer) {
+      Gt.block<3, 3>(row, 0).setIdentity();
+      for (int axis = 0; axis < 3; ++axis) Gt.block<3, 1>(row, 3 + axis) = Eigen::Vector3d::Unit(axis).cross(arm);
+    } else {
+      Gt(row, 0) = Gt(row + 1, 1) = 1.0;
+      Gt.block<3, 1>(row, 2) = Eigen::Vector3d::UnitZ().cross(arm);
+    }
+    row += 3;
+  }
+}
+
+}  // namespace graspatlas

@@ -1,0 +1,111 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/grasp/model.hpp"
+#include "graspatlas/grasp/patch.hpp"
+
+namespace graspatlas {
+
+/// One parameter of a patch: frozen at a value, or one of the unknowns.
+struct PatchParameter {
+  bool free = false;
+  double value = 0.0;  ///< where it is frozen [rad or m]
+  bool periodic = false;
+  double lower = -1.0, upper = 1.0;  ///< interval of a free parameter that is not periodic
+};
+
+/// A patch on a joint of the model.
+struct ContactSide {
+  int joint = 0;
+  Placement frame;  ///< frame of the patch in the joint
+  std::shared_ptr<const Patch> patch;
+  PatchParameter u, v;
+};
+
+/// Points coincide and normals oppose, eqs (7) and (8): five equations.
+struct Contact {
+  ContactSide hand, object;
+};
+
+/// Where both sides of a contact are: in the world (the palm's frame).
+struct ContactPoint {
+  Eigen::Vector3d hand_point, object_point;
+  Eigen::Vector3d hand_normal, object_normal;  ///< outward unit normals
+};
+
+/// The relevant grasps R (Sections II and III): contacts, hand motions, joint limits and patch intervals.
+///
+/// A point is x = [q, w]: Pinocchio's configuration of hand and object, then the free patch parameters, contact by
+/// contact, hand before object, u before v. A tangent vector is [y, object, w]: y are velocities along the hand motions
+/// that are kept, so that eq (13), E_s' (q_hand - q_hand,1) = 0, holds by construction; lengths are divided by
+/// `length_scale`. Equations: for each contact three for the points (divided by length_scale) and two for the normals.
+class GraspSystem : public System {
+ public:
+  /// `motions` [hand_v_size x p] are the hand motions kept, orthonormal columns; the identity keeps them all.
+  /// Limits [hand_q_size] apply to joints with one number each; infinite ones are none.
+  GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> contacts, const Matrix& motions, double length_scale,
+              const std::vector<double>& lower, const std::vector<double>& upper);
+
+  void residual(const double* x, double* R) override;
+  void linearize(const double* x, double* R, double* J) override;
+  void integrate(const double* x, const double* v, double* out) const override;
+  void difference(const double* x0, const double* x1, double* out) const override;
+  void embed(const double* x, double* out) const override;
+  void slack(const double* x, double* out) const override;
+
+  const Model& model() const { return *model_; }
+  int contact_count() const { return static_cast<int>(contacts_.size()); }
+  int parameter_count() const { return static_cast<int>(parameters_.size()); }
+  double length_scale() const { return length_scale_; }
+  /// Name of each bound, in the order of `slack`.
+  const std::vector<std::string>& bound_names() const { return bound_names_; }
+
+  /// Contact points and normals at x [contact_count].
+  void contact_points(const double* x, ContactPoint* out);
+  /// J [3m x hand_v_size]: joint velocities to velocities of the contact points, and Gt [3m x object dof], the grasp
+  /// matrix transposed: the object's velocity (linear at its origin, then angular; world axes) to those of the points.
+  void grasp_matrices(const double* x, Eigen::Ref<RowMatrix> J, Eigen::Ref<RowMatrix> Gt);
+  int object_dof() const;
+
+ private:
+  struct Bound {
+    bool joint;  // else a patch parameter
+    int index;   // in q, or in w
+    double sign, limit, scale;
+  };
+  struct FreeParameter {
+    const PatchParameter* parameter;
+    bool angle;
+  };
+  struct SideState {
+    PatchPoint local;
+    Eigen::Matrix3d rotation;
+    Eigen::Vector3d point;
+  };
+
+  static int count_free(const std::vector<Contact>& contacts);
+  static int embedding_size(const Model& model, const std::vector<Contact>& contacts, int motions);
+  void add_joint_bounds(const std::vector<double>& lower, const std::vector<double>& upper);
+  void add_parameter_bounds();
+  void place_side(const ContactSide& side, const double*& w, SideState& out) const;
+  void contact_residual(const SideState& hand, const SideState& object, double* R) const;
+  void add_column(int v, double sign, const Eigen::Vector3d& point, const Eigen::Vector3d& a_cross_m,
+                  const Eigen::Vector3d& b_cross_m, double* J) const;
+
+  std::shared_ptr<Model> model_;
+  std::vector<Contact> contacts_;
+  RowMatrix motions_;
+  bool all_motions_;
+  int motion_count_, object_v_size_;
+  double length_scale_;
+  std::vector<FreeParameter> parameters_;
+  std::vector<Bound> bounds_;
+  std::vector<std::string> bound_names_;
+  mutable std::vector<double> velocity_;  // full tangent vector of the model
+};
+
+}  // namespace graspatlas

@@ -1,0 +1,129 @@
+#include "graspatlas/grasp/model.hpp"
+
+#include <pinocchio/algorithm/jacobian.hpp>
+#include <pinocchio/algorithm/joint-configuration.hpp>
+#include <pinocchio/algorithm/kinematics.hpp>
+#include <pinocchio/multibody.hpp>
+#include <pinocchio/parsers/urdf.hpp>
+
+#include "graspatlas/continuation/system.hpp"
+
+namespace graspatlas {
+
+namespace {
+
+using FreeFlyerSpace = pinocchio::SpecialEuclideanOperationTpl<3, double, 0>;
+using PlanarSpace = pinocchio::SpecialEuclideanOperationTpl<2, double, 0>;
+template <int n>
+using Numbers = Eigen::Map<Eigen::Matrix<double, n, 1>>;
+template <int n>
+using ConstNumbers = Eigen::Map<const Eigen::Matrix<double, n, 1>>;
+
+std::vector<double> to_std(const Eigen::VectorXd& v) { return {v.data(), v.data() + v.size()}; }
+
+pinocchio::Model build_model(const std::string& urdf) {
+  pinocchio::Model model;
+  try {
+    pinocchio::urdf::buildModelFromXML(urdf, model);
+  } catch (const std::exception& error) {
+    throw Error(std::string("the hand's URDF cannot be read: ") + error.what());
+  }
+  return model;
+}
+
+}  // namespace
+
+struct Model::Pinocchio {
+  pinocchio::Model model;
+  pinocchio::Data data;
+};
+
+Model::Model(const std::string& urdf, ObjectJoint object) : pinocchio_(new Pinocchio), object_kind_(object) {
+  pinocchio::Model& model = pinocchio_->model;
+  model = build_model(urdf);
+  hand_q_size_ = model.nq;
+  hand_v_size_ = model.nv;
+  for (pinocchio::JointIndex j = 1; j < static_cast<pinocchio::JointIndex>(model.njoints); ++j) {
+    hand_joints_.push_back({model.names[j], model.idx_qs[j], model.nqs[j], model.idx_vs[j], model.nvs[j]});
+    if (model.nqs[j] != model.nvs[j]) hand_is_euclidean_ = false;
+  }
+  for (const pinocchio::Frame& frame : model.frames) {
+    if (frame.type != pinocchio::BODY && frame.type != pinocchio::OP_FRAME) continue;
+    hand_frames_.push_back({frame.name, static_cast<int>(frame.parentJoint),
+                            {frame.placement.rotation(), frame.placement.translation()}});
+  }
+  const auto identity = pinocchio::SE3::Identity();
+  if (object == ObjectJoint::free_flyer)
+    object_joint_ = static_cast<int>(model.addJoint(0, pinocchio::JointModelFreeFlyer(), identity, "object"));
+  else if (object == ObjectJoint::planar)
+    object_joint_ = static_cast<int>(model.addJoint(0, pinocchio::JointModelPlanar(), identity, "object"));
+  if (model.nv == 0) throw Error("the hand's URDF has no joint that moves");
+  pinocchio_->data = pinocchio::Data(model);
+  placements_.resize(model.njoints);
+  supports_.resize(model.njoints);
+  for (std::size_t j = 0; j < supports_.size(); ++j)
+    for (const auto ancestor : model.supports[j])
+      for (int v = 0; v < model.nvs[ancestor]; ++v) supports_[j].push_back(model.idx_vs[ancestor] + v);
+}
+
+Model::~Model() = default;
+
+int Model::q_size() const { return pinocchio_->model.nq; }
+int Model::v_size() const { return pinocchio_->model.nv; }
+
+std::vector<double> Model::lower_limits() const { return to_std(pinocchio_->model.lowerPositionLimit.head(hand_q_size_)); }
+std::vector<double> Model::upper_limits() const { return to_std(pinocchio_->model.upperPositionLimit.head(hand_q_size_)); }
+std::vector<double> Model::neutral() const { return to_std(pinocchio::neutral(pinocchio_->model)); }
+
+void Model::integrate(const double* q, const double* v, double* out) const {
+  if (!hand_is_euclidean_) {
+    const Eigen::Map<const Eigen::VectorXd> q_map(q, q_size()), v_map(v, v_size());
+    const Eigen::VectorXd result = pinocchio::integrate(pinocchio_->model, q_map, v_map);
+    Eigen::Map<Eigen::VectorXd>(out, q_size()) = result;
+    return;
+  }
+  for (int i = 0; i < hand_q_size_; ++i) out[i] = q[i] + v[i];
+  const double *q_object = q + hand_q_size_, *v_object = v + hand_v_size_;
+  if (object_kind_ == ObjectJoint::free_flyer) {
+    Eigen::Matrix<double, 7, 1> moved;
+    FreeFlyerSpace().integrate(ConstNumbers<7>(q_object), ConstNumbers<6>(v_object), moved);
+    Numbers<7>(out + hand_q_size_) = moved;
+  } else if (object_kind_ == ObjectJoint::planar) {
+    Eigen::Matrix<double, 4, 1> moved;
+    PlanarSpace().integrate(ConstNumbers<4>(q_object), ConstNumbers<3>(v_object), moved);
+    Numbers<4>(out + hand_q_size_) = moved;
+  }
+}
+
+void Model::difference(const double* q0, const double* q1, double* out) const {
+  if (!hand_is_euclidean_) {
+    const Eigen::Map<const Eigen::VectorXd> a(q0, q_size()), b(q1, q_size());
+    Eigen::Map<Eigen::VectorXd>(out, v_size()) = pinocchio::difference(pinocchio_->model, a, b);
+    return;
+  }
+  for (int i = 0; i < hand_q_size_; ++i) out[i] = q1[i] - q0[i];
+  const double *a = q0 + hand_q_size_, *b = q1 + hand_q_size_;
+  if (object_kind_ == ObjectJoint::free_flyer) {
+    Numbers<6> d(out + hand_v_size_);
+    FreeFlyerSpace().difference(ConstNumbers<7>(a), ConstNumbers<7>(b), d);
+  } else if (object_kind_ == ObjectJoint::planar) {
+    Numbers<3> d(out + hand_v_size_);
+    PlanarSpace().difference(ConstNumbers<4>(a), ConstNumbers<4>(b), d);
+  }
+}
+
+void Model::update(const double* q, bool jacobians) {
+  const Eigen::Map<const Eigen::VectorXd> q_map(q, q_size());
+  if (jacobians)
+    pinocchio::computeJointJacobians(pinocchio_->model, pinocchio_->data, q_map);
+  else
+    pinocchio::forwardKinematics(pinocchio_->model, pinocchio_->data, q_map);
+  for (std::size_t j = 0; j < placements_.size(); ++j) {
+    placements_[j].rotation = pinocchio_->data.oMi[j].rotation();
+    placements_[j].translation = pinocchio_->data.oMi[j].translation();
+  }
+}
+
+const double* Model::velocity(int v) const { return pinocchio_->data.J.col(v).data(); }
+
+}  // namespace graspatlas

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "graspatlas/grasp/patch.hpp"
+
+namespace graspatlas {
+
+/// How the object moves: all six ways, in the palm's x-y plane, or there is no object.
+enum class ObjectJoint { free_flyer, planar, none };
+
+struct JointInfo {
+  std::string name;
+  int q_index, q_size, v_index, v_size;
+};
+
+struct FrameInfo {
+  std::string name;
+  int joint;            ///< joint that carries the frame; 0 is the fixed base
+  Placement placement;  ///< of the frame in the joint
+};
+
+/// Hand and object as one kinematic tree; q = [hand, object] in Pinocchio's conventions.
+///
+/// Its source is the only file that includes Pinocchio. A model holds the results of its last `update`, so it must not
+/// be shared between threads.
+class Model {
+ public:
+  /// `urdf` is the text of the hand's URDF; its root is the world. Throws Error when it cannot be read.
+  Model(const std::string& urdf, ObjectJoint object);
+  ~Model();
+
+  int q_size() const;
+  int v_size() const;
+  int hand_q_size() const { return hand_q_size_; }
+  int hand_v_size() const { return hand_v_size_; }
+  int object_joint() const { return object_joint_; }  ///< -1 without an object
+  ObjectJoint object_kind() const { return object_kind_; }
+  const std::vector<JointInfo>& hand_joints() const { return hand_joints_; }
+  const std::vector<FrameInfo>& hand_frames() const { return hand_frames_; }
+  std::vector<double> lower_limits() const;  ///< of the hand [hand_q_size]
+  std::vector<double> upper_limits() const;
+  std::vector<double> neutral() const;  ///< [q_size]
+  /// True when the hand's q are plain numbers (revolute and prismatic joints), so that (+) is addition.
+  bool hand_is_euclidean() const { return hand_is_euclidean_; }
+
+  /// v in q (+) v, and q1 (-) q0: Pinocchio's integrate and difference.
+  void integrate(const double* q, const double* v, double* out) const;
+  void difference(const double* q0, const double* q1, double* out) const;
+
+  /// Placements of all joints, and with `jacobians` the columns below.
+  void update(const double* q, bool jacobians);
+  const Placement& placement(int joint) const { return placements_[joint]; }
+  /// Spatial velocity [linear at the world's origin, angular] of everything that tangent coordinate v carries.
+  const double* velocity(int v) const;
+  /// Tangent coordinates that move a joint.
+  const std::vector<int>& support(int joint) const { return supports_[joint]; }
+
+ private:
+  struct Pinocchio;
+  std::unique_ptr<Pinocchio> pinocchio_;
+  int hand_q_size_, hand_v_size_, object_joint_ = -1;
+  ObjectJoint object_kind_;
+  bool hand_is_euclidean_ = true;
+  std::vector<JointInfo> hand_joints_;
+  std::vector<FrameInfo> hand_frames_;
+  std::vector<Placement> placements_;
+  std::vector<std::vector<int>> supports_;
+};
+
+}  // namespace graspatlas
