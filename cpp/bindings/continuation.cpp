@@ -202,7 +202,6 @@ void bind_parts(py::module_& module) {
       .def("contains", [](const Polytope& p, const DoubleArray& u, double tolerance) {
         return p.contains(checked_vector(u, p.dimension(), "u"), tolerance);
       }, py::arg("u"), py::arg("tolerance") = 0.0, "True when u is inside all half-spaces.")
-      .def_property_readonly("volume", &Polytope::volume, "k-dimensional volume.")
       .def_property_readonly("vertices", [](const Polytope& p) {
         return copied(p.vertex(0), p.vertex_count(), p.dimension());
       }, "Vertices [n x k].");

@@ -8,7 +8,7 @@ namespace graspatlas {
 
 namespace {
 
-// Below this residual the Jacobian just factorised is accurate enough to give the last step and the tangent basis.
+// Below this residual the factorisation serves for the remaining steps, which converge at once, and for the tangent basis.
 constexpr double kNearlyZero = 1e-6;
 // A Jacobian whose smallest singular value is this far below its largest has lost rank.
 constexpr double kRankTolerance = 1e-9;
@@ -39,49 +39,48 @@ bool Newton::factorize(const double* Phi) {
   return solver_.factorize();
 }
 
-double Newton::evaluate_residual(const double* x) {
-  system_.residual(x, R_.data());
-  return largest_entry(R_);
-}
-
 Projection Newton::project(double* x, const double* Phi) {
   const int n = system_.tangent_size();
-  bool refreshed = true;
+  bool nearly = false;  // the last factorisation was made nearly at the solution: it finishes the work
   double previous = HUGE_VAL;
   for (int iteration = 0; iteration <= options_.max_iterations; ++iteration) {
-    // Quadratic convergence: once nearly zero, the last factorisation finishes the work and a residual suffices.
-    if (refreshed) {
-      system_.linearize(x, R_.data(), J_.data());
-      residual_ = largest_entry(R_);
-      if (!std::isfinite(residual_)) return Projection::not_converged;
-      if (!factorize(Phi)) return Projection::singular;
-    } else {
-      residual_ = evaluate_residual(x);
-      if (!std::isfinite(residual_)) return Projection::not_converged;
-    }
+    system_.linearize(x, R_.data(), J_.data());
+    residual_ = largest_entry(R_);
+    if (!std::isfinite(residual_)) return Projection::not_converged;
+    if (nearly && residual_ > 0.1 * previous) nearly = false;
+    if (!nearly && !factorize(Phi)) return Projection::singular;
     if (residual_ <= options_.tolerance) return Projection::converged;
-    if (!refreshed && residual_ > 0.1 * previous) return Projection::not_converged;
-    if (iteration >= 2 && refreshed && residual_ > 10.0 * previous) return Projection::not_converged;
+    if (iteration >= 2 && residual_ > 10.0 * previous) return Projection::not_converged;
     previous = residual_;
-    refreshed = refreshed && residual_ > kNearlyZero;
+    nearly = nearly || residual_ <= kNearlyZero;
     std::transform(R_.begin(), R_.end(), step_.begin(), [](double r) { return -r; });
     std::fill(step_.begin() + static_cast<long>(R_.size()), step_.end(), 0.0);
     solver_.solve(step_.data());
-    double length = 0.0;
-    for (int i = 0; i < n; ++i) length += step_[i] * step_[i];
-    if (!std::isfinite(length)) return Projection::not_converged;
+    double squared = 0.0;
+    for (int i = 0; i < n; ++i) squared += step_[i] * step_[i];
+    if (!std::isfinite(squared)) return Projection::not_converged;
     system_.integrate(x, step_.data(), x);
   }
   return Projection::not_converged;
 }
 
-bool Newton::tangent_basis(double* Phi) const {
+bool Newton::tangent_basis(double* Phi) {
   const int n = system_.tangent_size(), k = system_.dimension(), equations = system_.equation_count();
   for (int i = 0; i < k; ++i) {
     double* row = Phi + static_cast<std::size_t>(i) * n;
     std::fill_n(row, n, 0.0);
     row[equations + i] = 1.0;
     solver_.solve(row);
+    // The factorisation may be that of a point nearby: one step of iterative refinement with the Jacobian here.
+    for (int e = 0; e < equations; ++e) {
+      const double* gradient = &J_[static_cast<std::size_t>(e) * n];
+      double dot = 0.0;
+      for (int c = 0; c < n; ++c) dot += gradient[c] * row[c];
+      step_[e] = dot;
+    }
+    std::fill(step_.begin() + equations, step_.end(), 0.0);
+    solver_.solve(step_.data());
+    for (int c = 0; c < n; ++c) row[c] -= step_[c];
     // Gram-Schmidt, twice for orthogonality to working precision.
     for (int pass = 0; pass < 2; ++pass)
       for (int j = 0; j < i; ++j) {

@@ -29,7 +29,7 @@ class Newton {
 
   /// Orthonormal tangent basis [dimension x tangent_size] at the point that `project` has just found.
   /// False when the tangent space is not well defined there.
-  bool tangent_basis(double* Phi) const;
+  bool tangent_basis(double* Phi);
 
   /// Move x onto the manifold by least-norm steps, and its tangent basis: for a first point, where no basis is known.
   Projection project_freely(double* x, double* Phi);
@@ -38,7 +38,6 @@ class Newton {
 
  private:
   bool factorize(const double* Phi);
-  double evaluate_residual(const double* x);
 
   System& system_;
   NewtonOptions options_;

@@ -1,7 +1,5 @@
 #include "graspatlas/continuation/polytope.hpp"
 
-#include <Eigen/Core>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -164,66 +162,6 @@ bool Polytope::contains(const double* u, double tolerance) const {
     if (s > tolerance) return false;
   }
   return true;
-}
-
-namespace {
-
-// Volume of the simplices that join the points `apex` to a triangulation of the face whose vertices are `face`.
-// At each level the face's first vertex is coned over the face's own facets that do not contain it.
-struct Triangulation {
-  int k;
-  const std::vector<double>& vertices;
-  const std::vector<std::uint16_t>& facets;
-  std::vector<int> apex;
-
-  bool on_facet(int vertex, int facet) const {
-    const auto* row = &facets[static_cast<std::size_t>(vertex) * k];
-    return std::find(row, row + k, facet) != row + k;
-  }
-
-  double simplex() const {
-    Eigen::MatrixXd edges(k, k);
-    for (int i = 0; i < k; ++i)
-      for (int c = 0; c < k; ++c)
-        edges(i, c) = vertices[static_cast<std::size_t>(apex[i + 1]) * k + c] -
-                      vertices[static_cast<std::size_t>(apex[0]) * k + c];
-    double factorial = 1.0;
-    for (int i = 2; i <= k; ++i) factorial *= i;
-    return std::abs(edges.determinant()) / factorial;
-  }
-
-  double volume(const std::vector<int>& face, int face_dimension) {
-    if (face.empty()) return 0.0;
-    const int first = face.front();
-    apex.push_back(first);
-    double sum = 0.0;
-    if (face_dimension == 0) {
-      sum = simplex();
-    } else {
-      std::vector<int> candidates;
-      for (int vertex : face)
-        for (int c = 0; c < k; ++c) candidates.push_back(facets[static_cast<std::size_t>(vertex) * k + c]);
-      std::sort(candidates.begin(), candidates.end());
-      candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
-      for (int facet : candidates) {
-        if (on_facet(first, facet)) continue;
-        std::vector<int> smaller;
-        for (int vertex : face)
-          if (on_facet(vertex, facet)) smaller.push_back(vertex);
-        if (static_cast<int>(smaller.size()) >= face_dimension) sum += volume(smaller, face_dimension - 1);
-      }
-    }
-    apex.pop_back();
-    return sum;
-  }
-};
-
-}  // namespace
-
-double Polytope::volume() const {
-  std::vector<int> all(vertex_count());
-  for (int i = 0; i < vertex_count(); ++i) all[i] = i;
-  return Triangulation{k_, vertices_, facets_, {}}.volume(all, k_);
 }
 
 }  // namespace graspatlas

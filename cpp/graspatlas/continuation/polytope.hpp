@@ -41,9 +41,6 @@ class Polytope {
 
   bool contains(const double* u, double tolerance) const;
 
-  /// k-dimensional volume, by the triangulation of Cohen and Hickey.
-  double volume() const;
-
  private:
   using FacetIndex = std::uint16_t;
 

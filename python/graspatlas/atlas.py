@@ -1,0 +1,252 @@
+"""The atlas of a manifold as arrays: charts, their polytopes and who neighbours whom (Section IV of the paper)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from enum import Enum
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import nnls
+from scipy.spatial import ConvexHull, cKDTree
+
+from graspatlas import _core
+from graspatlas.errors import GraspAtlasError
+from graspatlas.systems import AnySystem
+
+__all__ = ["BOX_TAG", "Atlas", "Closed", "Status"]
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+#: Facet tag of the initial box; a tag t >= 0 is the neighbour's index, t <= -2 is bound -2 - t.
+BOX_TAG = -1
+#: Facets of a polygon shorter than this share of the radius are left out of the surface's triangulation.
+SHORT_FACET = 0.05
+
+
+class Status(str, Enum):
+    """How the construction of an atlas ended; all but the first are cut short."""
+
+    COMPLETE = "complete"
+    CHART_LIMIT = "cut short: limit of charts"
+    TIME_LIMIT = "cut short: limit of time"
+    INTERRUPTED = "cut short: interrupted"
+
+    def __str__(self) -> str:
+        return self.value
+
+
+class Closed(int, Enum):
+    """Why a vertex of a polytope was not expanded."""
+
+    OPEN = 0
+    BOUNDS = 1
+    CURVATURE = 2
+    NOT_CONVERGED = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Atlas:
+    """Charts that cover the part of a manifold connected to a first point.
+
+    Chart i covers the points above the polytope ``{u : facet_normals u <= facet_offsets}`` of its tangent space; facets
+    and vertices of all charts are stored one after another, chart i has rows ``start[i]`` to ``start[i + 1]``.
+
+    Attributes:
+        system: The system R(x) = 0.
+        radius, epsilon: r and epsilon of the paper [units of the tangent space].
+        status: Whether the atlas is complete.
+        seconds: Time that its construction took.
+        centers: Chart centres x_i [n, configuration_size].
+        bases: Orthonormal tangent bases Phi_i, one tangent vector a row [n, k, tangent_size].
+        residuals: Largest entry of |R(x_i)| [n].
+        facet_start, facet_normals, facet_offsets, facet_tags: Facets [n + 1], [f, k], [f], [f]; see ``BOX_TAG``.
+        vertex_start, vertices, vertex_closed: Vertices [n + 1], [v, k], and the :class:`Closed` reason of each [v].
+        neighbour_pairs: Pairs of charts that cut each other [p, 2].
+    """
+
+    system: AnySystem
+    radius: float
+    epsilon: float
+    status: Status
+    seconds: float
+    centers: Array
+    bases: Array
+    residuals: Array
+    facet_start: IntArray
+    facet_normals: Array
+    facet_offsets: Array
+    facet_tags: NDArray[np.int32]
+    vertex_start: IntArray
+    vertices: Array
+    vertex_closed: NDArray[np.uint8]
+    neighbour_pairs: NDArray[np.int32]
+
+    @property
+    def n_charts(self) -> int:
+        """Number of charts."""
+        return len(self.centers)
+
+    @property
+    def dimension(self) -> int:
+        """k: dimension of the manifold."""
+        return int(self.bases.shape[1])
+
+    @property
+    def complete(self) -> bool:
+        """True when no chart was left to expand."""
+        return self.status is Status.COMPLETE
+
+    @property
+    def closed_vertices(self) -> dict[str, int]:
+        """How many vertices outside their chart's ball no step could leave, by reason."""
+        return {
+            reason.name.lower(): int((self.vertex_closed == reason.value).sum())
+            for reason in Closed
+            if reason is not Closed.OPEN
+        }
+
+    def facets(self, chart: int) -> tuple[Array, Array, NDArray[np.int32]]:
+        """Unit normals [f, k], offsets [f] and tags [f] of a chart's polytope: normals u <= offsets."""
+        rows = slice(self.facet_start[chart], self.facet_start[chart + 1])
+        return self.facet_normals[rows], self.facet_offsets[rows], self.facet_tags[rows]
+
+    def polytope(self, chart: int) -> Array:
+        """Vertices of a chart's polytope [v, k]; in order round the polygon when k = 2."""
+        vertices = self.vertices[self.vertex_start[chart] : self.vertex_start[chart + 1]]
+        if self.dimension == 2:
+            return np.asarray(vertices[np.argsort(np.arctan2(vertices[:, 1], vertices[:, 0]))])
+        return vertices
+
+    def point(self, chart: int, u: ArrayLike) -> Array | None:
+        """Point of the manifold above u [k] of a chart, eqs (14) and (15).
+
+        Returns:
+            The point [configuration_size], or None when Newton's method does not converge.
+        """
+        x = _core.project(self.system, self.centers[chart], self.bases[chart], np.asarray(u, float))
+        return None if x is None else np.asarray(x)
+
+    @cached_property
+    def volumes(self) -> Array:
+        """k-dimensional volume of each chart's polytope [n]."""
+        if self.dimension == 1:
+            return np.array([np.ptp(self.polytope(i)) for i in range(self.n_charts)])
+        return np.array([ConvexHull(self.polytope(i)).volume for i in range(self.n_charts)])
+
+    @cached_property
+    def neighbours(self) -> list[IntArray]:
+        """Neighbours of each chart, ascending."""
+        pairs = np.concatenate([self.neighbour_pairs, self.neighbour_pairs[:, ::-1]]).astype(np.int64)
+        pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+        ends = np.searchsorted(pairs[:, 0], np.arange(self.n_charts + 1))
+        return [pairs[a:b, 1] for a, b in zip(ends[:-1], ends[1:], strict=True)]
+
+    @cached_property
+    def _index(self) -> cKDTree:
+        return cKDTree(np.array([self.system.embed(x) for x in self.centers]))
+
+    def locate(self, x: ArrayLike) -> tuple[int, float]:
+        """Chart whose polytope a point of the manifold lies in, or the nearest one.
+
+        Args:
+            x: A point of the manifold [configuration_size].
+
+        Returns:
+            The chart's index and the distance from the point's image to the polytope, 0 inside; (-1, inf) when no chart
+            within reach has the point near its tangent space.
+        """
+        point = np.asarray(x, float)
+        best, best_distance = -1, np.inf
+        for chart in sorted(self._index.query_ball_point(self.system.embed(point), 2.0 * self.radius)):
+            displacement = self.system.difference(self.centers[chart], point)
+            u = self.bases[chart] @ displacement
+            if displacement @ displacement - u @ u > self.epsilon**2:
+                continue
+            normals, offsets, _ = self.facets(chart)
+            excess = float((normals @ u - offsets).max())
+            if excess >= best_distance:
+                continue
+            distance = 0.0 if excess <= 0.0 else _distance_to_polytope(u, normals, offsets)
+            if distance < best_distance:
+                best, best_distance = chart, distance
+            if distance == 0.0:
+                break
+        return best, best_distance
+
+    def euler_characteristic(self) -> int:
+        """Euler characteristic V - E + F of the surface that the charts triangulate; for closed manifolds with k = 2.
+
+        Charts are the vertices, facets that two charts have in common are the edges, and the faces are traced round the
+        charts' polygons, so that the count holds also where four charts meet.
+
+        Raises:
+            GraspAtlasError: If k is not 2, or the atlas has a boundary or is cut short.
+        """
+        if self.dimension != 2:
+            raise GraspAtlasError(f"the Euler characteristic is counted for k = 2, this atlas has k = {self.dimension}")
+        if not self.complete or (self.facet_tags < 0).any():
+            raise GraspAtlasError("the Euler characteristic needs a complete atlas without boundary")
+        rings, edges = self._rotation_system()
+        seen: set[tuple[int, int, int]] = set()
+        faces = 0
+        for start in [(i, j, turn) for turn in (1, -1) for i in rings for j in rings[i]]:
+            if start in seen:
+                continue
+            faces += 1
+            dart = start
+            while dart not in seen:
+                seen.add(dart)
+                i, j, turn = dart
+                turn *= self._orientation(i, j)
+                ring = rings[j]
+                dart = (j, ring[(ring.index(i) + turn) % len(ring)], turn)
+        # Every face is traced twice, once in each direction.
+        return len(rings) - len(edges) + faces // 2
+
+    def _rotation_system(self) -> tuple[dict[int, list[int]], set[tuple[int, int]]]:
+        """Neighbours of each chart in order round its polygon, joined by facets that both charts have.
+
+        Short facets are left out: near a corner of four charts, seen in four tangent planes, both diagonals may seem to
+        be edges. Leaving out an edge joins two faces and keeps V - E + F.
+        """
+        order = {i: self._facet_ring(i) for i in range(self.n_charts)}
+        edges = {(i, j) for i, ring in order.items() for j in ring if i < j and i in order[j]}
+        rings = {i: [j for j in ring if (min(i, j), max(i, j)) in edges] for i, ring in order.items()}
+        return rings, edges
+
+    def _facet_ring(self, chart: int) -> list[int]:
+        """Neighbours behind the long facets of a polygon, in order round it."""
+        normals, offsets, tags = self.facets(chart)
+        ring = np.argsort(np.arctan2(normals[:, 1], normals[:, 0]))
+        after = np.roll(ring, -1)
+        corners = np.linalg.solve(
+            np.stack([normals[ring], normals[after]], axis=1), np.stack([offsets[ring], offsets[after]], axis=1)[..., None]
+        )[..., 0]
+        lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
+        return [int(tags[f]) for f, length in zip(ring, lengths, strict=True) if length > SHORT_FACET * self.radius]
+
+    def _orientation(self, i: int, j: int) -> int:
+        """1 when the tangent bases of two charts have the same orientation, else -1."""
+        return 1 if np.linalg.det(self.bases[i] @ self.bases[j].T) > 0.0 else -1
+
+    def to_arrays(self) -> dict[str, Any]:
+        """All arrays by name, for storing."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SCALARS}
+
+
+_SCALARS = ("system", "radius", "epsilon", "status", "seconds")
+
+
+def _distance_to_polytope(u: Array, normals: Array, offsets: Array) -> float:
+    """Distance from u to {w : normals w <= offsets}, by the dual least-squares problem with signs."""
+    # min |d|^2 / 2 s.t. normals (u + d) <= offsets has the dual solution d = -normals' z, z >= 0. Lawson and Hanson's
+    # least-distance transformation solves it by one non-negative least-squares problem.
+    excess = normals @ u - offsets
+    A = np.vstack([-normals.T, excess[None]])
+    z, _ = nnls(A, np.r_[np.zeros(len(u)), 1.0])
+    r = A @ z - np.r_[np.zeros(len(u)), 1.0]
+    return float(np.linalg.norm(r[:-1] / r[-1]))

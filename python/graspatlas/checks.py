@@ -1,0 +1,172 @@
+"""Verification of a result from the problem that it carries; every check could fail."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graspatlas.atlas import Atlas, Closed
+from graspatlas.grasps import Grasps
+from graspatlas.quality import INDICES, evaluate
+from graspatlas.systems import AnySystem
+
+if TYPE_CHECKING:
+    from graspatlas.result import Result
+
+__all__ = ["Check", "CheckReport", "check_atlas", "check_result"]
+
+Array = NDArray[np.float64]
+
+#: Largest residual of a chart centre, of its contacts and of its frozen hand motions.
+RESIDUAL_TOLERANCE = 1e-9
+#: How far a tangent basis may be from orthonormal, and from the null space of the Jacobian.
+TANGENT_TOLERANCE = 1e-7
+#: How far the half-spaces of two neighbours may be from the bisectors of their centres.
+HALF_SPACE_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Check:
+    """One claim and what was measured.
+
+    Attributes:
+        claim: What should hold.
+        measured: The worst value found.
+        limit: The largest value allowed.
+    """
+
+    claim: str
+    measured: float
+    limit: float
+
+    @property
+    def passed(self) -> bool:
+        """True when the claim holds; false for NaN."""
+        return bool(self.measured <= self.limit)
+
+    def __str__(self) -> str:
+        return f"{'ok  ' if self.passed else 'FAIL'}  {self.claim}: {self.measured:.3g} (limit {self.limit:.3g})"
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """The outcome of all checks.
+
+    Attributes:
+        checks: The checks, in the order in which they were made.
+    """
+
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        """True when every check passed."""
+        return all(check.passed for check in self.checks)
+
+    def __bool__(self) -> bool:
+        return self.passed
+
+    def __str__(self) -> str:
+        return "\n".join(str(check) for check in self.checks)
+
+
+def check_atlas(atlas: Atlas, system: AnySystem | None = None) -> CheckReport:
+    """Verify an atlas against its system: centres, bounds, tangent bases, polytopes and neighbours.
+
+    Args:
+        atlas: The atlas.
+        system: The system to check against; the atlas's own by default.
+
+    Returns:
+        What was measured.
+    """
+    return CheckReport(tuple(_atlas_checks(atlas, system or atlas.system)))
+
+
+def _atlas_checks(atlas: Atlas, system: AnySystem) -> Iterator[Check]:
+    residuals = [np.abs(system.evaluate_residual(x)).max(initial=0.0) for x in atlas.centers]
+    yield Check("largest residual of a chart centre", float(np.max(residuals)), RESIDUAL_TOLERANCE)
+    slacks = [system.slack(x).min(initial=np.inf) for x in atlas.centers]
+    yield Check("farthest that a centre lies outside its bounds", float(-np.min(slacks)), RESIDUAL_TOLERANCE)
+    gram = atlas.bases @ atlas.bases.transpose(0, 2, 1) - np.eye(atlas.dimension)
+    yield Check("tangent bases are orthonormal to", float(np.abs(gram).max()), RESIDUAL_TOLERANCE)
+    slopes = [
+        np.abs(system.evaluate_jacobian(x) @ basis.T).max(initial=0.0)
+        for x, basis in zip(atlas.centers, atlas.bases, strict=True)
+    ]
+    yield Check("tangent bases lie in the null space of the Jacobian to", float(np.max(slopes)), TANGENT_TOLERANCE)
+    yield from _neighbour_checks(atlas, system)
+    if atlas.complete:
+        norms = np.linalg.norm(atlas.vertices, axis=1)
+        beyond = (norms > atlas.radius) & (atlas.vertex_closed == Closed.OPEN.value)
+        yield Check("vertices of a complete atlas that could still be expanded", float(beyond.sum()), 0.0)
+
+
+def _neighbour_checks(atlas: Atlas, system: AnySystem) -> Iterator[Check]:
+    """Neighbours pass the tests of eqs (17) and (18), and each facet is the bisector that both charts agree on."""
+    pairs = {(int(i), int(j)): system.difference(atlas.centers[i], atlas.centers[j]) for i, j in atlas.neighbour_pairs}
+    i, j = atlas.neighbour_pairs.T
+    d = np.array(list(pairs.values())).reshape(len(pairs), system.tangent_size)
+    images = [np.einsum("nkv,nv->nk", atlas.bases[c], d) for c in (i, j)]
+    off = [np.sqrt(np.maximum((d * d).sum(axis=1) - (p * p).sum(axis=1), 0.0)) for p in images]
+    yield Check("neighbours are off each other's tangent space by", float(np.max(off, initial=0.0)), atlas.epsilon)
+    M = np.einsum("nav,nbv->nab", atlas.bases[i], atlas.bases[j])
+    cosines = np.linalg.svd(M, compute_uv=False).min(axis=1, initial=1.0)
+    widest = float(1.0 - cosines.min(initial=1.0))
+    yield Check("neighbouring tangent spaces differ by 1 - cosine of", widest, atlas.epsilon * (1.0 + 1e-9))
+    worst, strangers = 0.0, 0
+    for chart in range(atlas.n_charts):
+        normals, offsets, tags = atlas.facets(chart)
+        for normal, offset, tag in zip(normals, offsets, tags, strict=True):
+            if tag < 0:
+                continue
+            key = (min(chart, int(tag)), max(chart, int(tag)))
+            if key not in pairs:
+                strangers += 1
+                continue
+            p = atlas.bases[chart] @ (pairs[key] if chart == key[0] else -pairs[key])
+            worst = max(worst, float(np.abs(2.0 * offset * normal - p).max()))
+    yield Check("facets between charts that are not neighbours", float(strangers), 0.0)
+    yield Check("half-spaces of neighbours are off the bisector by", worst, HALF_SPACE_TOLERANCE)
+
+
+def check_result(result: Result) -> CheckReport:
+    """Verify a result from the problem that it carries.
+
+    Beside :func:`check_atlas`: the frozen hand motions of eq (13), opposite normals, a closed atlas, the qualities (when
+    the index has a name) and the choice of the best.
+
+    Args:
+        result: The result.
+
+    Returns:
+        What was measured.
+    """
+    return CheckReport(tuple(_result_checks(result)))
+
+
+def _result_checks(result: Result) -> Iterator[Check]:
+    problem, atlas = result.problem, result.atlas
+    system = problem.system(result.dimension)
+    yield from _atlas_checks(atlas, system)
+    frozen = problem.frozen_residual(atlas.centers, result.dimension)
+    yield Check("frozen hand motions, eq (13), are off by", float(np.abs(frozen).max(initial=0.0)), RESIDUAL_TOLERANCE)
+    start = float(np.abs(system.difference(problem.x1_array, atlas.centers[0])).max())
+    yield Check("the first chart is off x1 by [rad or length_scale]", start, 1.0)
+    grasps = Grasps(problem, atlas.centers, system)
+    arrays = system.grasp_arrays(grasps.x)
+    cosines = np.einsum("nmc,nmc->nm", arrays["hand_normals"], arrays["object_normals"])
+    yield Check("cosine between hand's and object's normals", float(cosines.max()), -1.0 + 1e-9)
+    for reason in ("curvature", "not_converged"):
+        yield Check(f"vertices closed for {reason.replace('_', ' ')}", float(atlas.closed_vertices[reason]), 0.0)
+    if result.quality in INDICES:
+        again = evaluate(result.quality, grasps)
+        scale = np.maximum(np.abs(again), 1e-12)
+        error = float((np.abs(again - result.qualities) / scale).max())
+        yield Check("qualities differ from a new evaluation by, relatively", error, 1e-6)
+    gap = float(result.qualities.max() - result.best.quality)
+    yield Check("a chart is better than the best grasp by", gap, 0.0)

@@ -1,0 +1,29 @@
+"""The one exception of the package, and help with names that do not exist."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+from graspatlas._core import GraspAtlasError
+
+__all__ = ["GraspAtlasError", "unknown_name"]
+
+
+def unknown_name(kind: str, name: object, known: Iterable[str], place: str = "") -> GraspAtlasError:
+    """Error for a name that is not known, with the nearest one that is.
+
+    Args:
+        kind: What the name should name, such as ``"frame"``.
+        name: What came.
+        known: The names that exist.
+        place: Where it was looked for, such as ``"in hand 'schunk_sah'"``.
+
+    Returns:
+        The error, to be raised by the caller.
+    """
+    names = sorted(known)
+    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
+    where = f"not {place}" if place else "unknown"
+    hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(names) or 'none'}"
+    return GraspAtlasError(f"{kind} '{name}' is {where}; {hint}")

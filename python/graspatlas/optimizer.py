@@ -1,0 +1,177 @@
+"""Algorithm 1 of the paper: an atlas of the relevant grasps, and the best of them."""
+
+from __future__ import annotations
+
+import sys
+import time
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from tqdm import tqdm
+
+from graspatlas import _core
+from graspatlas.atlas import Atlas, Status
+from graspatlas.errors import GraspAtlasError
+from graspatlas.grasps import Grasps
+from graspatlas.problem import Problem
+from graspatlas.quality import Quality, evaluate, find_index
+from graspatlas.result import Result
+from graspatlas.systems import AnySystem
+
+__all__ = ["build_atlas", "optimize"]
+
+_NO_LIMIT = 2**62
+_SLICE_SECONDS = 0.1  # between looks at the clock, at Ctrl-C and at the progress bar
+_QUIET_SECONDS = 1.0  # work that ends within this shows no progress bar
+
+
+def build_atlas(
+    system: AnySystem,
+    x0: ArrayLike,
+    *,
+    radius: float,
+    epsilon: float,
+    max_charts: int | None = None,
+    max_seconds: float | None = None,
+    progress: bool | None = None,
+) -> Atlas:
+    """Cover the solutions of R(x) = 0 that are connected to a first point with charts.
+
+    Ctrl-C ends the work and returns what there is, with a status that says so.
+
+    Args:
+        system: The equations: one of :mod:`graspatlas.systems`, a problem's, or your own subclass of
+            :class:`graspatlas.System`.
+        x0: First point [configuration_size]; it is projected onto the manifold.
+        radius: r, of the ball that a chart may cover [units of the tangent space].
+        epsilon: Largest distance between a chart and the manifold, and largest 1 - cosine between neighbouring tangent
+            spaces; between 0 and 1.
+        max_charts, max_seconds: Limits after which the atlas is cut short; none by default.
+        progress: Show a progress bar on standard error; by default when it is a terminal.
+
+    Returns:
+        The atlas.
+
+    Raises:
+        GraspAtlasError: If an argument makes no sense, x0 cannot be projected, or the Jacobian has lost rank there.
+
+    Source: "Global Optimization of Robotic Grasps", Algorithm 1, lines 4 to 13.
+    """
+    if not isinstance(system, AnySystem):
+        raise GraspAtlasError(f"system must be a graspatlas.System, got {type(system).__name__}")
+    radius = _positive("radius", radius)
+    epsilon = _positive("epsilon", epsilon)
+    charts = _NO_LIMIT if max_charts is None else _whole("max_charts", max_charts)
+    limit = float("inf") if max_seconds is None else _positive("max_seconds", max_seconds)
+    start = time.perf_counter()
+    builder = _core.AtlasBuilder(system, _numbers("x0", x0), radius, epsilon)
+    status = _grow(builder, charts, start + limit, progress)
+    seconds = time.perf_counter() - start
+    return Atlas(system=system, radius=radius, epsilon=epsilon, status=status, seconds=seconds, **builder.arrays())
+
+
+def _grow(builder: _core.AtlasBuilder, max_charts: int, deadline: float, progress: bool | None) -> Status:
+    shown = sys.stderr.isatty() if progress is None else progress
+    bar = tqdm(desc="atlas", unit=" charts", disable=not shown, delay=_QUIET_SECONDS, file=sys.stderr, initial=1)
+    try:
+        while not builder.complete:
+            remaining = deadline - time.perf_counter()
+            if remaining <= 0.0:
+                return Status.TIME_LIMIT
+            if builder.n_charts >= max_charts:
+                return Status.CHART_LIMIT
+            builder.expand(max_charts, min(_SLICE_SECONDS, remaining))
+            bar.set_postfix(open=builder.n_open, refresh=False)
+            bar.update(builder.n_charts - bar.n)
+    except KeyboardInterrupt:
+        return Status.INTERRUPTED
+    finally:
+        bar.close()
+    return Status.COMPLETE
+
+
+def optimize(
+    problem: Problem,
+    *,
+    dimension: int | None = None,
+    radius: float | None = None,
+    epsilon: float | None = None,
+    quality: Quality | None = None,
+    max_charts: int | None = None,
+    max_seconds: float | None = None,
+    progress: bool | None = None,
+) -> Result:
+    """Find the best grasp of a problem: trace all relevant grasps, then read a quality index on them.
+
+    What is not given comes from ``problem.defaults``.
+
+    Args:
+        problem: The problem; see :func:`graspatlas.load_problem`.
+        dimension: k, of the set of relevant grasps: 1 to t.
+        radius: r, of a chart [rad, and lengths in units of ``problem.length_scale``].
+        epsilon: See :func:`build_atlas`.
+        quality: Name of an index, or a callable: see :mod:`graspatlas.quality`.
+        max_charts, max_seconds, progress: See :func:`build_atlas`.
+
+    Returns:
+        The result: best and worst grasp, atlas, qualities and status. The best grasp is the best of all grasps that are
+        connected to x1, up to the size of a chart, only when ``result.status`` is ``Status.COMPLETE``.
+
+    Raises:
+        GraspAtlasError: If an argument makes no sense, or the index fails.
+
+    Source: "Global Optimization of Robotic Grasps", Algorithm 1.
+    """
+    if not isinstance(problem, Problem):
+        raise GraspAtlasError(f"problem must be a graspatlas.Problem, got {type(problem).__name__}; see load_problem")
+    chosen = {"dimension": dimension, "radius": radius, "epsilon": epsilon, "quality": quality}
+    options: dict[str, Any] = {key: _chosen(problem, key, value) for key, value in chosen.items()}
+    find_index(options["quality"])
+    system = problem.system(options["dimension"])
+    atlas = build_atlas(
+        system,
+        problem.x1_array,
+        radius=options["radius"],
+        epsilon=options["epsilon"],
+        max_charts=max_charts,
+        max_seconds=max_seconds,
+        progress=progress,
+    )
+    start = time.perf_counter()
+    qualities = evaluate(options["quality"], Grasps(problem, atlas.centers, system))
+    return Result(
+        problem=problem,
+        atlas=atlas,
+        quality=options["quality"],
+        qualities=qualities,
+        quality_seconds=time.perf_counter() - start,
+    )
+
+
+def _chosen(problem: Problem, key: str, value: Any) -> Any:
+    if value is not None:
+        return value
+    if key not in problem.defaults:
+        raise GraspAtlasError(f"problem '{problem.name}' has no default {key}: give one")
+    return problem.defaults[key]
+
+
+def _numbers(name: str, value: ArrayLike) -> np.ndarray[Any, np.dtype[np.float64]]:
+    try:
+        return np.asarray(value, float)
+    except (TypeError, ValueError):
+        raise GraspAtlasError(f"{name} must be an array of numbers, got {value!r}") from None
+
+
+def _positive(name: str, value: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < float(value) < float("inf"):
+        raise GraspAtlasError(f"{name} must be a positive number, got {value!r}")
+    return float(value)
+
+
+def _whole(name: str, value: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < 1:
+        raise GraspAtlasError(f"{name} must be a whole number of at least 1, got {value!r}")
+    return int(value)

@@ -1,0 +1,461 @@
+"""A grasp problem: hand, object, contacts, hand motions and a first grasp (Sections II and III of the paper)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graspatlas import _core
+from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.hand import Body, Hand, robots_folder
+from graspatlas.motions import HandMotions
+from graspatlas.patches import Patch, patch_from_dict
+
+__all__ = ["Contact", "FirstGrasp", "Problem", "bundled_problems", "load_problem"]
+
+Array = NDArray[np.float64]
+
+#: How far a first grasp may miss a contact, since it is projected onto the contacts anyway [m], [rad].
+CONTACT_TOLERANCE = 1e-3
+NORMAL_TOLERANCE = 0.05
+#: How far a first grasp may break a joint limit or leave a patch [rad or m].
+LIMIT_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Two patches that touch: their points coincide and their normals oppose, eqs (7) and (8).
+
+    Attributes:
+        frame: Link or frame of the hand that carries the hand's patch.
+        hand: Patch in that frame; its normal points out of the hand.
+        object: Patch in the object's frame; its normal points out of the object.
+        frozen: Values of the parameters of the object's patch that do not move, such as ``{"u": 0.5}`` [rad or m].
+        hand_frozen: The same for the hand's patch.
+    """
+
+    frame: str
+    hand: Patch
+    object: Patch
+    frozen: Mapping[str, float] = field(default_factory=dict)
+    hand_frozen: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for patch, frozen in ((self.object, self.frozen), (self.hand, self.hand_frozen)):
+            for name, value in frozen.items():
+                if name not in patch.parameters:
+                    raise unknown_name("parameter", name, patch.parameters, f"one of a {patch.kind} patch's")
+                if not np.isfinite(value):
+                    raise GraspAtlasError(f"parameter '{name}' is frozen at {value}; it must be finite")
+
+    def free(self) -> list[tuple[Patch, str]]:
+        """Patches and names of the free parameters, in the order in which they stand in x."""
+        sides = ((self.hand, self.hand_frozen), (self.object, self.frozen))
+        return [(patch, name) for patch, frozen in sides for name in patch.parameters if name not in frozen]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The contact as plain data."""
+        return {
+            "frame": self.frame,
+            "hand": self.hand.to_dict(),
+            "object": self.object.to_dict(),
+            "frozen": dict(self.frozen),
+            "hand_frozen": dict(self.hand_frozen),
+        }
+
+
+@dataclass(frozen=True)
+class FirstGrasp:
+    """A feasible grasp x1 from which the atlas grows.
+
+    Attributes:
+        joints: Joint positions by name [rad or m]; all of the hand's.
+        object_xyz: Position of the object in the palm's frame [m].
+        object_quat_xyzw: Its rotation; normalised.
+        parameters: Free patch parameters in the order of x; found from the contact points when not given.
+    """
+
+    joints: Mapping[str, float]
+    object_xyz: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    object_quat_xyzw: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+    parameters: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        numbers = [*self.joints.values(), *self.object_xyz, *self.object_quat_xyzw, *(self.parameters or ())]
+        if not np.isfinite(np.asarray(numbers, float)).all():
+            raise GraspAtlasError("x1 holds a number that is not finite")
+        if len(self.object_xyz) != 3 or len(self.object_quat_xyzw) != 4:
+            raise GraspAtlasError("x1 needs object_xyz of 3 numbers and object_quat_xyzw of 4")
+        norm = float(np.linalg.norm(self.object_quat_xyzw))
+        if norm < 1e-6:
+            raise GraspAtlasError("x1 has a quaternion of length zero")
+        x, y, z, w = (float(c) / norm for c in self.object_quat_xyzw)
+        object.__setattr__(self, "object_quat_xyzw", (x, y, z, w))
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """All that defines the set of relevant grasps, and defaults for its atlas.
+
+    Attributes:
+        name: Its name.
+        hand: The hand.
+        object: The object.
+        contacts: The contacts, at least one.
+        x1: A feasible first grasp.
+        motions: Principal hand motions; without them only the full dimension t can be traced.
+        length_scale: Length that counts as much as one radian [m].
+        defaults: ``dimension``, ``radius``, ``epsilon`` and ``quality`` to use when the caller names none.
+        description, source: For people.
+
+    Raises:
+        GraspAtlasError: If a contact names no frame of the hand, or x1 misses its contacts or breaks a limit.
+    """
+
+    name: str
+    hand: Hand
+    object: Body
+    contacts: tuple[Contact, ...]
+    x1: FirstGrasp
+    motions: HandMotions | None = None
+    length_scale: float = 0.01
+    defaults: Mapping[str, Any] = field(default_factory=dict)
+    description: str = ""
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "contacts", tuple(self.contacts))
+        if not self.contacts:
+            raise GraspAtlasError(f"problem '{self.name}' has no contact")
+        if not (np.isfinite(self.length_scale) and self.length_scale > 0.0):
+            raise GraspAtlasError(f"length_scale must be positive, got {self.length_scale}")
+        self._check_joints()
+        for contact in self.contacts:
+            self.hand.frame(contact.frame)
+        self._check_x1()
+
+    def _check_joints(self) -> None:
+        for name in self.x1.joints:
+            if name not in self.hand.joints:
+                raise unknown_name("joint", name, self.hand.joints, f"in hand '{self.hand.name}'")
+        missing = [name for name in self.hand.joints if name not in self.x1.joints]
+        if missing:
+            raise GraspAtlasError(f"x1 gives no position for joint '{missing[0]}' of hand '{self.hand.name}'")
+        if self.motions and set(self.motions.joints) != set(self.hand.joints):
+            odd = sorted(set(self.motions.joints) ^ set(self.hand.joints))[0]
+            raise GraspAtlasError(
+                f"the hand motions and hand '{self.hand.name}' do not have the same joints: see '{odd}'"
+            )
+
+    def _check_x1(self) -> None:
+        arrays = self.full_system.grasp_arrays(self.x1_array[None])
+        gaps = np.linalg.norm(arrays["hand_points"] - arrays["object_points"], axis=2)[0]
+        cosines = np.sum(arrays["hand_normals"] * arrays["object_normals"], axis=2)[0]
+        angles = np.arccos(np.clip(-cosines, -1.0, 1.0))
+        if (gaps > CONTACT_TOLERANCE).any() or (angles > NORMAL_TOLERANCE).any():
+            rows = ", ".join(
+                f"{contact.frame}: {1000.0 * gap:.3g} mm, {np.degrees(angle):.3g} degrees"
+                for contact, gap, angle in zip(self.contacts, gaps, angles, strict=True)
+            )
+            raise GraspAtlasError(
+                f"x1 of problem '{self.name}' misses its contacts ({rows}); at most {1000 * CONTACT_TOLERANCE:g} mm "
+                f"and {np.degrees(NORMAL_TOLERANCE):.2g} degrees are allowed: correct the object's pose or the joints"
+            )
+        slack = self.full_system.slack(self.x1_array)
+        if slack.size and slack.min() < -LIMIT_TOLERANCE:
+            broken = [
+                f"{name} by {-s:.3g}"
+                for name, s in zip(self.full_system.bound_names, slack, strict=True)
+                if s < -LIMIT_TOLERANCE
+            ]
+            raise GraspAtlasError(f"x1 of problem '{self.name}' breaks the {', the '.join(broken)} [rad or length_scale]")
+
+    @cached_property
+    def full_system(self) -> _core.GraspSystem:
+        """The system F of all feasible grasps, no hand motion frozen: eq (9)."""
+        return self._system(np.eye(self.hand.model.hand_v_size))
+
+    @cached_property
+    def full_dimension(self) -> int:
+        """t: dimension of the manifold F of feasible grasps at x1, from the rank of its Jacobian."""
+        system = self.full_system
+        singular = np.linalg.svd(system.evaluate_jacobian(self.x1_array), compute_uv=False)
+        return system.tangent_size - int((singular > 1e-8 * singular[0]).sum())
+
+    def frozen_motions(self, dimension: int) -> int:
+        """s = t - k: how many hand motions are frozen for a manifold of dimension k (eq 12).
+
+        Raises:
+            GraspAtlasError: If `dimension` is not between 1 and t, or there are no hand motions to freeze.
+        """
+        t = self.full_dimension
+        if isinstance(dimension, bool) or not isinstance(dimension, int | np.integer) or not 1 <= dimension <= t:
+            raise GraspAtlasError(
+                f"dimension must be a whole number from 1 to {t}, the dimension of all grasps of problem "
+                f"'{self.name}'; got {dimension!r}"
+            )
+        s = t - int(dimension)
+        if s > 0 and self.motions is None:
+            raise GraspAtlasError(
+                f"problem '{self.name}' has no hand motions, so its dimension cannot be reduced; use dimension={t}"
+            )
+        if s >= self.hand.model.hand_v_size:
+            raise GraspAtlasError(
+                f"dimension {dimension} would freeze {s} hand motions, all that hand '{self.hand.name}' has"
+            )
+        return s
+
+    def system(self, dimension: int) -> _core.GraspSystem:
+        """The system R of relevant grasps of this dimension: eqs (11) to (13)."""
+        s = self.frozen_motions(dimension)
+        if s == 0 or self.motions is None:
+            return self._system(np.eye(self.hand.model.hand_v_size))
+        return self._system(self.motions.reordered(self.hand.joints).kept(s))
+
+    def _system(self, motions: Array) -> _core.GraspSystem:
+        model = _core.Model(self.hand.urdf, "free_flyer")
+        sides = []
+        for contact, parameters in zip(self.contacts, self._x1_parameters, strict=True):
+            joint, T = self.hand.frame(contact.frame)
+            hand = self._side(joint, T, contact.hand, contact.hand_frozen, parameters[0])
+            body = self._side(model.object_joint, np.eye(4), contact.object, contact.frozen, parameters[1])
+            sides.append((hand, body))
+        lower, upper = self.hand.joint_limits
+        return _core.GraspSystem(model, sides, motions, self.length_scale, list(lower), list(upper))
+
+    @staticmethod
+    def _side(
+        joint: int, T: Array, patch: Patch, frozen: Mapping[str, float], at_x1: tuple[float, float]
+    ) -> _core.ContactSide:
+        parameters = []
+        for name, value in zip(("u", "v"), at_x1, strict=True):
+            free = name in patch.parameters and name not in frozen
+            interval = patch.interval(name) if free else None
+            low, high = interval or (-np.pi, np.pi)
+            parameters.append(_core.PatchParameter(free, value, free and interval is None, low, high))
+        return _core.ContactSide(joint, T, patch.core(), *parameters)
+
+    @cached_property
+    def _x1_parameters(self) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+        """(u, v) of the hand's and of the object's patch of each contact at x1."""
+        given = iter(self.x1.parameters) if self.x1.parameters is not None else None
+        T_object = self._T_object
+        q = self._q_hand
+        places = self.hand.link_placements(q)
+        out = []
+        for contact in self.contacts:
+            T_frame = places[contact.frame]
+            hand_guess = contact.hand.locate(_apply(_inverse(T_frame), T_object[:3, 3]))
+            hand = self._parameters(contact.hand, contact.hand_frozen, hand_guess, given)
+            touch = _apply(T_frame, contact.hand.point(*hand))
+            body_guess = contact.object.locate(_apply(_inverse(T_object), touch))
+            out.append((hand, self._parameters(contact.object, contact.frozen, body_guess, given)))
+        if given is not None and next(given, None) is not None:
+            raise GraspAtlasError(f"x1 gives {len(self.x1.parameters or ())} patch parameters, more than are free")
+        return out
+
+    @staticmethod
+    def _parameters(
+        patch: Patch, frozen: Mapping[str, float], guess: tuple[float, float], given: Any
+    ) -> tuple[float, float]:
+        values = []
+        for name, value in zip(("u", "v"), guess, strict=True):
+            if name in frozen:
+                values.append(float(frozen[name]))
+            elif name in patch.parameters and given is not None:
+                number = next(given, None)
+                if number is None:
+                    raise GraspAtlasError("x1 gives fewer patch parameters than are free")
+                values.append(float(number))
+            else:
+                values.append(value)
+        return (values[0], values[1])
+
+    @cached_property
+    def _q_hand(self) -> Array:
+        q = np.array(self.hand.model.neutral, float)
+        for joint in self.hand.model.hand_joints:
+            value = self.x1.joints[joint.name]
+            if joint.q_size == 2:
+                q[joint.q_index : joint.q_index + 2] = np.cos(value), np.sin(value)
+            else:
+                q[joint.q_index] = value
+        return q
+
+    @cached_property
+    def _T_object(self) -> Array:
+        T = np.eye(4)
+        x, y, z, w = self.x1.object_quat_xyzw
+        v = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        T[:3, :3] = np.eye(3) + 2.0 * w * v + 2.0 * v @ v
+        T[:3, 3] = self.x1.object_xyz
+        return T
+
+    @cached_property
+    def x1_array(self) -> Array:
+        """x1 as the vector [q_hand, object position, object quaternion (x, y, z, w), free patch parameters]."""
+        free = []
+        for contact, (hand, body) in zip(self.contacts, self._x1_parameters, strict=True):
+            for patch, frozen, values in (
+                (contact.hand, contact.hand_frozen, hand),
+                (contact.object, contact.frozen, body),
+            ):
+                free += [values["uv".index(name)] for name in patch.parameters if name not in frozen]
+        return np.array([*self._q_hand, *self.x1.object_xyz, *self.x1.object_quat_xyzw, *free])
+
+    def frozen_residual(self, X: ArrayLike, dimension: int) -> Array:
+        """Eq (13), E_s' (q_hand - q_hand,1), at grasps X [n, size of x]: [n, s], zero on R."""
+        s = self.frozen_motions(dimension)
+        rows = np.atleast_2d(np.asarray(X, float))
+        if s == 0 or self.motions is None:
+            return np.zeros((len(rows), 0))
+        E_s = self.motions.reordered(self.hand.joints).frozen(s)
+        difference = self.full_system.difference
+        nv = self.hand.model.hand_v_size
+        return np.array([difference(self.x1_array, x)[:nv] @ E_s for x in rows])
+
+    def to_dict(self) -> dict[str, Any]:
+        """The problem as plain data that :meth:`from_dict` reads, with the text of its URDFs."""
+        return {
+            "name": self.name,
+            "description": self.description,
+            "source": self.source,
+            "hand": {**_body_dict(self.hand), "limits": {k: list(v) for k, v in self.hand.limits.items()}},
+            "object": _body_dict(self.object),
+            "length_scale": self.length_scale,
+            "contacts": [contact.to_dict() for contact in self.contacts],
+            "hand_motions": self.motions.to_dict() if self.motions else None,
+            "x1": {
+                "joints": dict(self.x1.joints),
+                "object_xyz": list(self.x1.object_xyz),
+                "object_quat_xyzw": list(self.x1.object_quat_xyzw),
+                "parameters": None if self.x1.parameters is None else list(self.x1.parameters),
+            },
+            "defaults": dict(self.defaults),
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], folder: Path | None = None) -> Problem:
+        """The problem that a problem file or :meth:`to_dict` describes.
+
+        Args:
+            data: The file's content.
+            folder: Where relative paths of URDFs start.
+
+        Raises:
+            GraspAtlasError: If something is missing or wrong.
+        """
+        if not isinstance(data, Mapping):
+            raise GraspAtlasError("a problem is a table with a name, a hand, an object, contacts and x1")
+        for key in ("name", "hand", "object", "contacts", "x1"):
+            if key not in data:
+                raise GraspAtlasError(f"the problem has no '{key}'")
+        hand_data = dict(data["hand"])
+        limits = {name: (float(v[0]), float(v[1])) for name, v in (hand_data.pop("limits", None) or {}).items()}
+        first = data["x1"]
+        try:
+            x1 = FirstGrasp(
+                joints={k: float(v) for k, v in first["joints"].items()},
+                object_xyz=tuple(map(float, first["object_xyz"])),  # type: ignore[arg-type]
+                object_quat_xyzw=tuple(map(float, first["object_quat_xyzw"])),  # type: ignore[arg-type]
+                parameters=tuple(map(float, first["parameters"])) if first.get("parameters") else None,
+            )
+            contacts = tuple(
+                Contact(
+                    frame=item["frame"],
+                    hand=patch_from_dict(item["hand"]),
+                    object=patch_from_dict(item["object"]),
+                    frozen=dict(item.get("frozen") or {}),
+                    hand_frozen=dict(item.get("hand_frozen") or {}),
+                )
+                for item in data["contacts"]
+            )
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            if isinstance(error, GraspAtlasError):
+                raise
+            raise GraspAtlasError(f"x1 or a contact of the problem is not complete: {error!r}") from None
+        motions = data.get("hand_motions")
+        return cls(
+            name=str(data["name"]),
+            hand=Hand(**_body_arguments(hand_data, folder), limits=limits),
+            object=Body(**_body_arguments(data["object"], folder)),
+            contacts=contacts,
+            x1=x1,
+            motions=HandMotions.from_dict(motions) if motions else None,
+            length_scale=float(data.get("length_scale", 0.01)),
+            defaults=dict(data.get("defaults") or {}),
+            description=str(data.get("description", "")),
+            source=str(data.get("source", "")),
+        )
+
+
+def _apply(T: Array, point: ArrayLike) -> Array:
+    return np.asarray(T[:3, :3] @ np.asarray(point) + T[:3, 3])
+
+
+def _inverse(T: Array) -> Array:
+    inverse = np.eye(4)
+    inverse[:3, :3] = T[:3, :3].T
+    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    return inverse
+
+
+def _body_dict(body: Body) -> dict[str, Any]:
+    return {"name": body.name, "urdf": body.urdf_path, "urdf_text": body.urdf, "srdf_text": body.srdf}
+
+
+def _body_arguments(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
+    """Arguments of a Body: read from its URDF file, or from the text that a stored problem carries."""
+    if "urdf" not in data:
+        raise GraspAtlasError(f"hand and object need a 'urdf', got {sorted(data)}")
+    name = data.get("name")
+    if data.get("urdf_text"):
+        try:
+            found = Body.from_urdf(data["urdf"], folder=folder).package_dirs
+        except GraspAtlasError:
+            found = (str(robots_folder()),)
+        text, srdf = str(data["urdf_text"]), str(data.get("srdf_text") or "")
+        return {"name": str(name), "urdf": text, "urdf_path": str(data["urdf"]), "package_dirs": found, "srdf": srdf}
+    return vars(Body.from_urdf(data["urdf"], name=name, srdf=data.get("srdf"), folder=folder))
+
+
+def bundled_problems() -> list[str]:
+    """Names of the problems that come with the package."""
+    folder = resources.files("graspatlas") / "problems"
+    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".json"))
+
+
+def load_problem(name: str | Path) -> Problem:
+    """Load a problem by its bundled name, or from a problem file (JSON).
+
+    Args:
+        name: Such as ``"schunk_can"``, or a path that ends in ``.json``.
+
+    Raises:
+        GraspAtlasError: If there is no such problem, or its file is damaged or wrong.
+    """
+    folder: Path | None = None
+    if str(name) in bundled_problems():
+        text = (resources.files("graspatlas") / "problems" / f"{name}.json").read_text(encoding="utf-8")
+    else:
+        path = Path(name)
+        if path.suffix != ".json" and not path.is_file():
+            raise unknown_name("problem", name, bundled_problems())
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise GraspAtlasError(f"cannot read problem file '{path}': {error}") from None
+        folder = path.parent
+    try:
+        data = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise GraspAtlasError(f"problem file '{name}' is not JSON: {error}") from None
+    return Problem.from_dict(data, folder)

@@ -1,0 +1,151 @@
+r"""Quality indices of grasps.
+
+An index is a function of grasps: larger is better, and a grasp to which it does not apply has 0. Those below read the
+manipulability ellipsoid of the object (Bicchi and Prattichizzo 2000): its semi-axes are the inverses of the singular
+values of :math:`J^+ G^\top` over the coordinated motions, with lengths in millimetres.
+
+Your own index is any function of one :class:`~graspatlas.grasps.Grasp` that returns a number. One that takes a whole
+:class:`~graspatlas.grasps.Grasps` batch and returns an array [n] is marked by :func:`batched`::
+
+    @ga.batched
+    def spread(grasps):
+        points = grasps.contact_points                      # [n, m, 3]
+        return np.linalg.norm(points - points.mean(axis=1, keepdims=True), axis=2).min(axis=1)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graspatlas import _core
+from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.grasps import Grasp, Grasps
+
+__all__ = [
+    "INDICES",
+    "Quality",
+    "batched",
+    "evaluate",
+    "inverse_condition_number",
+    "manipulability_volume",
+    "quality_name",
+    "smallest_semi_axis",
+]
+
+Array = NDArray[np.float64]
+Quality = str | Callable[[Any], Any]
+F = TypeVar("F", bound=Callable[[Grasps], Any])
+
+
+def batched(index: F) -> F:
+    """Mark a quality index as one that takes a :class:`Grasps` batch and returns an array [n]."""
+    index.batched = True  # type: ignore[attr-defined]
+    return index
+
+
+def _axes(grasps: Grasps) -> Array:
+    """Semi-axes over the motions that are coordinated at x1 [n, connectivity]; zero where a grasp has lost one."""
+    x1 = grasps.problem.x1_array
+    connectivity = int((_core.semi_axes(grasps.system, x1[None], grasps.LENGTH_UNIT) > 0.0).sum())
+    return grasps.semi_axes[:, grasps.semi_axes.shape[1] - connectivity :]
+
+
+@batched
+def inverse_condition_number(grasps: Grasps) -> Array:
+    """Smallest over largest semi-axis of the manipulability ellipsoid [n]; 1 is a sphere, 0 a singular grasp.
+
+    Source: "Global Optimization of Robotic Grasps", Section V, first index.
+    """
+    axes = _axes(grasps)
+    if axes.shape[1] == 0:
+        return np.zeros(len(grasps))
+    largest = axes[:, -1]
+    return np.divide(axes[:, 0], largest, out=np.zeros(len(grasps)), where=largest > 0.0)
+
+
+@batched
+def manipulability_volume(grasps: Grasps) -> Array:
+    """Product of the semi-axes of the manipulability ellipsoid [n], proportional to its volume; lengths in mm.
+
+    Source: "Global Optimization of Robotic Grasps", Section V, second index.
+    """
+    axes = _axes(grasps)
+    return np.asarray(axes.prod(axis=1)) if axes.shape[1] else np.zeros(len(grasps))
+
+
+@batched
+def smallest_semi_axis(grasps: Grasps) -> Array:
+    """Smallest semi-axis of the manipulability ellipsoid [n]; lengths in mm.
+
+    Source: "Global Optimization of Robotic Grasps", Section V, third index.
+    """
+    axes = _axes(grasps)
+    return axes[:, 0].copy() if axes.shape[1] else np.zeros(len(grasps))
+
+
+#: Indices by name.
+INDICES: dict[str, Callable[[Grasps], Array]] = {
+    index.__name__: index for index in (inverse_condition_number, manipulability_volume, smallest_semi_axis)
+}
+
+
+def find_index(quality: Quality) -> Callable[[Any], Any]:
+    """The index of a name, or the callable itself.
+
+    Raises:
+        GraspAtlasError: If there is no index of that name.
+    """
+    if callable(quality):
+        return quality
+    if quality not in INDICES:
+        raise unknown_name("quality index", quality, INDICES)
+    return INDICES[quality]
+
+
+def quality_name(quality: Quality) -> str:
+    """The name of an index."""
+    return quality if isinstance(quality, str) else getattr(quality, "__name__", type(quality).__name__)
+
+
+def evaluate(quality: Quality, grasps: Grasps) -> Array:
+    """Value of a quality index at each grasp [n].
+
+    Args:
+        quality: Name of an index, or a callable: see the top of this module.
+        grasps: The grasps.
+
+    Raises:
+        GraspAtlasError: If there is no such index, or a callable raises, or returns the wrong shape or a NaN.
+    """
+    index, name = find_index(quality), quality_name(quality)
+    try:
+        if getattr(index, "batched", False):
+            values = np.asarray(index(grasps), float)
+        else:
+            values = np.array([_number(index, grasp, name) for grasp in grasps], float).reshape(len(grasps))
+    except GraspAtlasError:
+        raise
+    except Exception as error:
+        raise GraspAtlasError(f"quality index '{name}' raised {type(error).__name__}: {error}") from error
+    if values.shape != (len(grasps),):
+        raise GraspAtlasError(
+            f"quality index '{name}' must return {len(grasps)} numbers for {len(grasps)} grasps; "
+            f"it returned an array of shape {values.shape}"
+        )
+    if np.isnan(values).any():
+        raise GraspAtlasError(f"quality index '{name}' returned NaN for grasp {int(np.isnan(values).argmax())}")
+    return values
+
+
+def _number(index: Callable[[Grasp], Any], grasp: Grasp, name: str) -> float:
+    value = np.asarray(index(grasp), float)
+    if value.ndim != 0:
+        raise GraspAtlasError(
+            f"quality index '{name}' must return one number for one grasp; it returned an array of shape {value.shape} "
+            "(an index that takes all grasps at once is marked with graspatlas.batched)"
+        )
+    return float(value)

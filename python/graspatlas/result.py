@@ -1,0 +1,227 @@
+"""What `optimize` returns: grasps, atlas, qualities; stored in one file, and able to verify itself."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graspatlas.atlas import Atlas, Status
+from graspatlas.checks import CheckReport, check_result
+from graspatlas.errors import GraspAtlasError
+from graspatlas.grasps import Grasp, Grasps
+from graspatlas.problem import Problem
+from graspatlas.quality import Quality, quality_name
+
+__all__ = ["Result", "load_result", "writable_folder"]
+
+Array = NDArray[np.float64]
+
+FORMAT = "graspatlas result"
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """The best grasp, and everything it was chosen from.
+
+    Attributes:
+        problem: The problem.
+        atlas: Atlas of the relevant grasps.
+        quality: The index: its name, or the callable.
+        qualities: Its value at each chart centre [n].
+        quality_seconds: Time that its evaluation took.
+    """
+
+    problem: Problem
+    atlas: Atlas
+    quality: Quality
+    qualities: Array
+    quality_seconds: float = 0.0
+
+    @property
+    def status(self) -> Status:
+        """Whether the atlas is complete, or why it was cut short."""
+        return self.atlas.status
+
+    @property
+    def dimension(self) -> int:
+        """k: dimension of the set of relevant grasps."""
+        return self.atlas.dimension
+
+    @property
+    def is_global(self) -> bool:
+        """True when the best grasp is the best of all that are connected to x1, up to the size of a chart.
+
+        The atlas must be complete, and no vertex closed for want of convergence or for curvature.
+        """
+        closed = self.atlas.closed_vertices
+        return self.atlas.complete and closed["curvature"] == 0 and closed["not_converged"] == 0
+
+    @cached_property
+    def best(self) -> Grasp:
+        """Grasp with the largest quality; the first of equals."""
+        return self.grasp(int(np.argmax(self.qualities)))
+
+    @cached_property
+    def worst(self) -> Grasp:
+        """Grasp with the smallest quality; the first of equals."""
+        return self.grasp(int(np.argmin(self.qualities)))
+
+    @property
+    def at_x1(self) -> Grasp:
+        """The first grasp; the atlas began with it."""
+        return self.grasp(0)
+
+    def grasp(self, chart: int) -> Grasp:
+        """Grasp at a chart's centre, with its quality.
+
+        Raises:
+            GraspAtlasError: If there is no such chart.
+        """
+        if not 0 <= chart < self.atlas.n_charts:
+            raise GraspAtlasError(f"chart {chart} does not exist; the atlas has charts 0 to {self.atlas.n_charts - 1}")
+        one = Grasps(self.problem, self.atlas.centers[chart])[0]
+        return replace(one, quality=float(self.qualities[chart]), chart=chart)
+
+    def check(self) -> CheckReport:
+        """Verify every chart again, from the problem alone; see :func:`graspatlas.checks.check_result`."""
+        return check_result(self)
+
+    def summary(self) -> dict[str, Any]:
+        """The result in plain data, as the command line prints it."""
+        atlas, best = self.atlas, self.best
+        return {
+            "problem": self.problem.name,
+            "dimension": self.dimension,
+            "radius": atlas.radius,
+            "epsilon": atlas.epsilon,
+            "length_scale": self.problem.length_scale,
+            "status": str(self.status),
+            "n_charts": atlas.n_charts,
+            "seconds": {"atlas": atlas.seconds, "quality": self.quality_seconds},
+            "max_residual": float(atlas.residuals.max()),
+            "quality": {
+                "name": quality_name(self.quality),
+                "best": best.quality,
+                "worst": self.worst.quality,
+                "at_x1": float(self.qualities[0]),
+            },
+            "best": {
+                "q": best.q.tolist(),
+                "object_xyz": best.object_xyz.tolist(),
+                "object_quat_xyzw": best.object_quat_xyzw.tolist(),
+                "chart": best.chart,
+            },
+        }
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the result to one file, which :func:`load_result` reads; an existing file is replaced at once or not.
+
+        Args:
+            path: Such as ``"can.npz"``.
+
+        Raises:
+            GraspAtlasError: If the file cannot be written.
+        """
+        target = Path(path)
+        header = {
+            "format": FORMAT,
+            "version": FORMAT_VERSION,
+            "problem": self.problem.to_dict(),
+            "dimension": self.dimension,
+            "radius": self.atlas.radius,
+            "epsilon": self.atlas.epsilon,
+            "status": self.status.name,
+            "seconds": self.atlas.seconds,
+            "quality": quality_name(self.quality),
+            "quality_seconds": self.quality_seconds,
+        }
+        temporary = None
+        try:
+            descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+            with os.fdopen(descriptor, "wb") as stream:
+                np.savez_compressed(
+                    stream, header=json.dumps(header), qualities=self.qualities, **self.atlas.to_arrays()
+                )
+            os.chmod(temporary, 0o644)
+            os.replace(temporary, target)
+        except OSError as error:
+            if temporary is not None and os.path.exists(temporary):
+                os.unlink(temporary)
+            raise GraspAtlasError(f"cannot write '{target}': {error.strerror or error}") from None
+
+
+def load_result(path: str | os.PathLike[str]) -> Result:
+    """Read a result that :meth:`Result.save` wrote. Nothing in the file is executed.
+
+    Args:
+        path: The file, or a folder that holds ``result.npz``.
+
+    Raises:
+        GraspAtlasError: If the file is missing, damaged, or of another version.
+    """
+    source = Path(path)
+    if source.is_dir():
+        source = source / "result.npz"
+    try:
+        with np.load(source, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        header = json.loads(str(arrays.pop("header")))
+        if header["format"] != FORMAT:
+            raise ValueError("another format")
+    except FileNotFoundError:
+        raise GraspAtlasError(f"result '{source}' does not exist") from None
+    except OSError as error:
+        raise GraspAtlasError(f"cannot read result '{source}': {error.strerror or error}") from None
+    except (ValueError, KeyError, EOFError, zipfile.BadZipFile, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
+        raise GraspAtlasError(
+            f"'{source}' is damaged or not a graspatlas result ({error}); compute it again"
+        ) from None
+    if header.get("version") != FORMAT_VERSION:
+        raise GraspAtlasError(
+            f"result '{source}' has version {header.get('version')}, this graspatlas reads {FORMAT_VERSION}"
+        )
+    return _from_parts(header, arrays, source)
+
+
+def _from_parts(header: Mapping[str, Any], arrays: dict[str, Any], source: Path) -> Result:
+    try:
+        problem = Problem.from_dict(header["problem"])
+        qualities = arrays.pop("qualities")
+        atlas = Atlas(
+            system=problem.system(header["dimension"]),
+            radius=header["radius"],
+            epsilon=header["epsilon"],
+            status=Status[header["status"]],
+            seconds=header["seconds"],
+            **arrays,
+        )
+        return Result(problem, atlas, header["quality"], qualities, header["quality_seconds"])
+    except (KeyError, TypeError) as error:
+        raise GraspAtlasError(f"result '{source}' lacks a part ({error}); compute it again") from None
+
+
+def writable_folder(path: str | os.PathLike[str]) -> Path:
+    """Make a folder, and make sure that files can be written there.
+
+    Raises:
+        GraspAtlasError: If they cannot.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise GraspAtlasError(f"cannot write to folder '{folder}': {error.strerror or error}") from None
+    return folder
