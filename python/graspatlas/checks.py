@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 #: Largest residual of a chart centre, of its contacts and of its frozen hand motions.
 RESIDUAL_TOLERANCE = 1e-9
 #: How far a tangent basis may be from orthonormal, and from the null space of the Jacobian.
-TANGENT_TOLERANCE = 1e-7
+TANGENT_TOLERANCE = 1e-6
 #: How far the half-spaces of two neighbours may be from the bisectors of their centres.
 HALF_SPACE_TOLERANCE = 1e-9
 
