@@ -1,0 +1,49 @@
+# make demo and make test do all the set-up: python3 with its venv module and g++ are enough.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SOURCES := pyproject.toml CMakeLists.txt $(shell find cpp python robots -type f -not -name '*.pyc')
+
+.PHONY: demo test bench lint stubs format clean
+
+demo: $(VENV)/.installed
+	$(BIN)/graspatlas optimize schunk_can --output out/schunk_can
+	$(BIN)/graspatlas view out/schunk_can --picture out/schunk_can/grasps.png --html out/schunk_can/grasps.html
+	@echo "Open out/schunk_can/grasps.html in a browser, or run: $(BIN)/graspatlas view out/schunk_can"
+
+test: $(VENV)/.tools
+	$(BIN)/python -m pytest
+
+bench: $(VENV)/.tools
+	$(BIN)/python benchmarks/run.py
+
+lint: $(VENV)/.tools
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/clang-format --dry-run --Werror $$(git ls-files '*.cpp' '*.hpp')
+	$(BIN)/mypy
+
+format: $(VENV)/.tools
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	$(BIN)/clang-format -i $$(git ls-files '*.cpp' '*.hpp')
+
+# Type stubs of the compiled module, from the module itself.
+stubs: $(VENV)/.tools
+	$(BIN)/pybind11-stubgen graspatlas._core --output-dir python --numpy-array-use-type-var
+	$(BIN)/ruff format python/graspatlas/_core.pyi
+
+$(VENV)/bin/python:
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+
+$(VENV)/.installed: $(VENV)/bin/python $(SOURCES)
+	$(BIN)/python -m pip install .
+	touch $@
+
+$(VENV)/.tools: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet ".[test,lint,stubs]"
+	touch $@
+
+clean:
+	rm -rf $(VENV) build out

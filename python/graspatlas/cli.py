@@ -1,0 +1,160 @@
+"""Command line: graspatlas list, optimize, view."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from graspatlas import __version__
+from graspatlas.atlas import Status
+from graspatlas.errors import GraspAtlasError
+from graspatlas.optimizer import optimize
+from graspatlas.problem import bundled_problems, load_problem
+from graspatlas.quality import INDICES
+from graspatlas.result import Result, load_result, writable_folder
+
+__all__ = ["main"]
+
+MISUSE = 2
+INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        arguments: The words after ``graspatlas``; those of the process by default.
+
+    Returns:
+        Exit status: 0, 2 for wrong input, 130 when interrupted.
+    """
+    options = _parser().parse_args(arguments)
+    try:
+        return int(options.run(options))
+    except GraspAtlasError as error:
+        print(f"graspatlas: error: {error}", file=sys.stderr)
+        return MISUSE
+    except KeyboardInterrupt:
+        print("graspatlas: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="graspatlas",
+        description="Find the globally best grasp of an object by a robotic hand when the contacts are given.",
+    )
+    parser.add_argument("--version", action="version", version=f"graspatlas {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    listing = commands.add_parser("list", help="list the bundled problems and the quality indices")
+    listing.set_defaults(run=_list)
+
+    best = commands.add_parser("optimize", help="trace all relevant grasps of a problem and find the best one")
+    best.add_argument("problem", help="name of a bundled problem, or path of a problem file (.json)")
+    best.add_argument("--dimension", type=int, metavar="K", help="dimension k of the set of relevant grasps")
+    best.add_argument("--radius", type=float, metavar="R", help="radius of a chart [rad, or lengths / length_scale]")
+    best.add_argument("--epsilon", type=float, metavar="E", help="how different neighbouring charts may be, 0 to 1")
+    best.add_argument("--quality", metavar="NAME", help=f"quality index: {', '.join(INDICES)}")
+    best.add_argument("--max-charts", type=int, metavar="N", help="cut the atlas short after N charts")
+    best.add_argument("--max-seconds", type=float, metavar="S", help="cut the atlas short after S seconds")
+    best.add_argument("--output", type=Path, metavar="FOLDER", help="write result.npz and summary.json there")
+    best.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    best.set_defaults(run=_optimize)
+
+    look = commands.add_parser("view", help="show the best and the worst grasp of a result")
+    look.add_argument("result", type=Path, help="folder or file that optimize wrote")
+    look.add_argument("--html", type=Path, metavar="FILE", help="write a page that needs no server instead")
+    look.add_argument("--picture", type=Path, metavar="FILE", help="write a PNG picture instead")
+    look.add_argument("--no-browser", action="store_true", help="do not open a browser, only say where to look")
+    look.set_defaults(run=_view)
+    return parser
+
+
+def _list(_: argparse.Namespace) -> int:
+    print("problems:")
+    for name in bundled_problems():
+        problem = load_problem(name)
+        print(f"  {name:22} t = {problem.full_dimension}. {problem.description}")
+    print("quality indices:")
+    for name, index in INDICES.items():
+        print(f"  {name:26} {(index.__doc__ or '').splitlines()[0]}")
+    return 0
+
+
+def _optimize(options: argparse.Namespace) -> int:
+    problem = load_problem(options.problem)
+    folder = writable_folder(options.output) if options.output else None
+    result = optimize(
+        problem,
+        dimension=options.dimension,
+        radius=options.radius,
+        epsilon=options.epsilon,
+        quality=options.quality,
+        max_charts=options.max_charts,
+        max_seconds=options.max_seconds,
+        progress=True,
+    )
+    if folder:
+        result.save(folder / "result.npz")
+        _write_summary(result, folder / "summary.json")
+    print(json.dumps(result.summary()) if options.json else _report(result, folder))
+    return INTERRUPTED if result.status is Status.INTERRUPTED else 0
+
+
+def _write_summary(result: Result, path: Path) -> None:
+    try:
+        path.write_text(json.dumps(result.summary(), indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise GraspAtlasError(f"cannot write '{path}': {error.strerror or error}") from None
+
+
+def _report(result: Result, folder: Path | None) -> str:
+    summary = result.summary()
+    seconds, quality, best = summary["seconds"], summary["quality"], result.best
+    closed = {reason: count for reason, count in result.atlas.closed_vertices.items() if count}
+    angles = "\n".join(f"    {name:20} {value:9.4f}" for name, value in zip(best.joints, best.q, strict=True))
+    lines = [
+        f"{summary['problem']}: {summary['n_charts']} charts of dimension {summary['dimension']} in "
+        f"{seconds['atlas']:.3f} s, index in {seconds['quality']:.3f} s; {summary['status']}",
+        f"  {quality['name']}: best {quality['best']:.6g}, worst {quality['worst']:.6g}, first grasp {quality['at_x1']:.6g}",
+        f"  largest residual {summary['max_residual']:.1e}",
+    ]
+    if closed:
+        lines.append(f"  vertices that no step could leave: {closed}")
+    lines += [
+        f"  best grasp (chart {best.chart}): object at {_row(best.object_xyz)} m, "
+        f"quaternion xyzw {_row(best.object_quat_xyzw)}, joints [rad]:",
+        angles,
+    ]
+    if not result.is_global:
+        lines.append("  the atlas does not cover all grasps: better ones may exist")
+    if folder:
+        lines.append(f"  written to {folder}; look at it with: graspatlas view {folder}")
+    return "\n".join(lines)
+
+
+def _row(values: Sequence[float]) -> str:
+    return "(" + ", ".join(f"{value:.4f}" for value in values) + ")"
+
+
+def _view(options: argparse.Namespace) -> int:
+    result = load_result(options.result)
+    from graspatlas.viewer import export_html, save_picture, view  # slow to import
+
+    if options.html:
+        export_html(result, options.html)
+        print(f"wrote {options.html}: open it in a browser", file=sys.stderr)
+    if options.picture:
+        save_picture(result, options.picture)
+        print(f"wrote {options.picture}", file=sys.stderr)
+    if not options.html and not options.picture:
+        view(result, open_browser=not options.no_browser)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
