@@ -323,15 +323,11 @@ def write_obj(path: Path, mesh: Mesh, crease: float | None = 0.7) -> None:
         unique, inverse = np.unique(normals.reshape(-1, 3), axis=0, return_inverse=True)
         lines += ["vn " + " ".join(f"{x:.{NORMAL_DECIMALS}f}" for x in n) for n in unique]
         pairs = zip(mesh.faces, inverse.reshape(-1, 3) + 1, strict=True)
-        lines += [
-            "f " + " ".join(f"{k + 1}//{n}" for k, n in zip(f, m, strict=True)) for f, m in pairs
-        ]
+        lines += ["f " + " ".join(f"{k + 1}//{n}" for k, n in zip(f, m, strict=True)) for f, m in pairs]
     path.write_text("\n".join(lines) + "\n", encoding="ascii", newline="\n")
 
 
-def write_all(
-    folder: Path, visual: dict[str, Callable[[], Mesh]], collision: dict[str, Callable[[], Mesh]]
-) -> None:
+def write_all(folder: Path, visual: dict[str, Callable[[], Mesh]], collision: dict[str, Callable[[], Mesh]]) -> None:
     """Build and write named meshes: visual ones with normals, convex collision ones without."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, build in visual.items():

@@ -108,9 +108,7 @@ def collision_hulls(name: str, link: str) -> Iterator[ConvexHull]:
             if isinstance(shape, coal.Cylinder):
                 angle = np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False)
                 circle = shape.radius * np.column_stack([np.cos(angle), np.sin(angle)])
-                ends = [
-                    np.column_stack([circle, np.full(90, s * shape.halfLength)]) for s in (-1, 1)
-                ]
+                ends = [np.column_stack([circle, np.full(90, s * shape.halfLength)]) for s in (-1, 1)]
                 points = np.vstack(ends)
             else:
                 points = read_obj(item.meshPath)[0]
@@ -141,10 +139,7 @@ def collision_gaps(name: str, link: str) -> tuple[float, float]:
 
 def body_links(name: str) -> list[str]:
     """Return the links that have a shape, one finger standing for all (the knuckles differ)."""
-    links = {
-        model(name).frames[g.parentFrame].name
-        for g in geometry(name, pin.COLLISION).geometryObjects
-    }
+    links = {model(name).frames[g.parentFrame].name for g in geometry(name, pin.COLLISION).geometryObjects}
     if name != "schunk_sah":
         return sorted(links)
     return sorted(k for k in links if not k.startswith(("middle", "ring")) or k.endswith("knuckle"))
@@ -295,9 +290,7 @@ def test_some_random_postures_are_free_and_some_collide() -> None:
 
 
 @pytest.mark.parametrize("folder", ["schunk_sah", "objects"])
-def test_meshes_can_be_made_again(
-    folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_meshes_can_be_made_again(folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Running the script again gives the same files."""
     script = load_script(folder)
     monkeypatch.setattr(script, "FOLDER", tmp_path)

@@ -2,10 +2,13 @@
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
+#include <pybind11/typing.h>
 
 namespace graspatlas {
 
 using DoubleArray = pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast>;
+
+using ArrayTable = pybind11::typing::Dict<pybind11::str, pybind11::array>;
 
 /// Pointer to the numbers of a one-dimensional array of this size; an Error that names it otherwise.
 const double* checked_vector(const DoubleArray& array, pybind11::ssize_t size, const char* name);

@@ -1,3 +1,5 @@
+#include <pybind11/stl.h>
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -28,7 +30,8 @@ class PythonSystem : public System, public py::trampoline_self_life_support {
       if (std::isfinite(low[i])) bounds_.push_back({i, -1.0, -low[i]});
     }
     RowMatrix B = RowMatrix::Zero(static_cast<Eigen::Index>(bounds_.size()), n_variables);
-    for (std::size_t b = 0; b < bounds_.size(); ++b) B(static_cast<Eigen::Index>(b), bounds_[b].variable) = bounds_[b].sign;
+    for (std::size_t b = 0; b < bounds_.size(); ++b)
+      B(static_cast<Eigen::Index>(b), bounds_[b].variable) = bounds_[b].sign;
     set_bound_normals(B);
   }
 
@@ -44,7 +47,8 @@ class PythonSystem : public System, public py::trampoline_self_life_support {
   }
 
   void slack(const double* x, double* out) const override {
-    for (std::size_t b = 0; b < bounds_.size(); ++b) out[b] = bounds_[b].limit - bounds_[b].sign * x[bounds_[b].variable];
+    for (std::size_t b = 0; b < bounds_.size(); ++b)
+      out[b] = bounds_[b].limit - bounds_[b].sign * x[bounds_[b].variable];
   }
 
  private:
@@ -54,14 +58,15 @@ class PythonSystem : public System, public py::trampoline_self_life_support {
   };
 
   void call(const char* method, const double* x, const std::vector<py::ssize_t>& shape, double* out) {
-    const py::function function = py::get_override(static_cast<const System*>(this), method);
+    const py::function function = py::get_override(this, method);
     if (!function) throw Error(std::string("a System needs a method ") + method + "(x)");
     const auto array = py::cast<DoubleArray>(function(py::array_t<double>(configuration_size(), x)));
     bool fits = array.ndim() == static_cast<py::ssize_t>(shape.size());
     for (std::size_t i = 0; fits && i < shape.size(); ++i) fits = array.shape(static_cast<py::ssize_t>(i)) == shape[i];
     if (!fits)
-      throw Error(std::string(method) + "(x) must return an array of shape " + py::str(py::cast(shape)).cast<std::string>() +
-                  "; it returned shape " + py::str(array.attr("shape")).cast<std::string>());
+      throw Error(std::string(method) + "(x) must return an array of shape " +
+                  py::str(py::cast(shape)).cast<std::string>() + "; it returned shape " +
+                  py::str(array.attr("shape")).cast<std::string>());
     std::copy_n(array.data(), array.size(), out);
   }
 
@@ -80,7 +85,7 @@ py::array_t<double> copied(const double* data, py::ssize_t rows, py::ssize_t col
 }
 
 /// The whole atlas as arrays; ragged parts (facets, vertices) as values and row offsets.
-py::dict atlas_arrays(const Atlas& atlas) {
+ArrayTable atlas_arrays(const Atlas& atlas) {
   const py::ssize_t n = atlas.count(), k = atlas.system().dimension(), v = atlas.system().tangent_size();
   py::ssize_t facets = 0, vertices = 0;
   for (py::ssize_t i = 0; i < n; ++i) {
@@ -121,7 +126,7 @@ py::dict atlas_arrays(const Atlas& atlas) {
     *pair++ = a;
     *pair++ = b;
   }
-  py::dict out;
+  ArrayTable out;
   out["centers"] = copied(atlas.center(0), n, atlas.system().configuration_size());
   out["bases"] = bases;
   out["residuals"] = residuals;
@@ -146,74 +151,109 @@ void bind_systems(py::module_& module) {
       .def_property_readonly("tangent_size", &System::tangent_size, "Numbers in a tangent vector v.")
       .def_property_readonly("n_equations", &System::equation_count, "Numbers in R(x).")
       .def_property_readonly("dimension", &System::dimension, "k: tangent_size - n_equations.")
-      .def_property_readonly("bound_normals", [](const System& s) {
-        return copied(s.bound_normals().data(), s.bound_count(), s.tangent_size());
-      }, "B [n_bounds x tangent_size]: slack(x (+) v) = slack(x) - B v to first order.")
-      .def("evaluate_residual", [](System& s, const DoubleArray& x) {
-        std::vector<double> R(s.equation_count());
-        s.residual(checked_vector(x, s.configuration_size(), "x"), R.data());
-        return vector(R);
-      }, py::arg("x"), "R(x) [n_equations].")
-      .def("evaluate_jacobian", [](System& s, const DoubleArray& x) {
-        std::vector<double> R(s.equation_count());
-        auto J = matrix<double>(s.equation_count(), s.tangent_size());
-        s.linearize(checked_vector(x, s.configuration_size(), "x"), R.data(), J.mutable_data());
-        return J;
-      }, py::arg("x"), "J(x) [n_equations x tangent_size], derivative of R(x (+) v) at v = 0.")
-      .def("integrate", [](const System& s, const DoubleArray& x, const DoubleArray& v) {
-        std::vector<double> out(s.configuration_size());
-        s.integrate(checked_vector(x, s.configuration_size(), "x"), checked_vector(v, s.tangent_size(), "v"), out.data());
-        return vector(out);
-      }, py::arg("x"), py::arg("v"), "x (+) v [configuration_size].")
-      .def("difference", [](const System& s, const DoubleArray& x0, const DoubleArray& x1) {
-        std::vector<double> out(s.tangent_size());
-        s.difference(checked_vector(x0, s.configuration_size(), "x0"),
-                     checked_vector(x1, s.configuration_size(), "x1"), out.data());
-        return vector(out);
-      }, py::arg("x0"), py::arg("x1"), "x1 (-) x0 [tangent_size].")
-      .def("embed", [](const System& s, const DoubleArray& x) {
-        std::vector<double> out(s.embedding_size());
-        s.embed(checked_vector(x, s.configuration_size(), "x"), out.data());
-        return vector(out);
-      }, py::arg("x"), "Euclidean image of x, by which charts are looked up.")
-      .def("slack", [](const System& s, const DoubleArray& x) {
-        std::vector<double> out(s.bound_count());
-        s.slack(checked_vector(x, s.configuration_size(), "x"), out.data());
-        return vector(out);
-      }, py::arg("x"), "Distance of x from each bound; negative outside.");
+      .def_property_readonly(
+          "bound_normals",
+          [](const System& s) { return copied(s.bound_normals().data(), s.bound_count(), s.tangent_size()); },
+          "B [n_bounds x tangent_size]: slack(x (+) v) = slack(x) - B v to first order.")
+      .def(
+          "evaluate_residual",
+          [](System& s, const DoubleArray& x) {
+            std::vector<double> R(s.equation_count());
+            s.residual(checked_vector(x, s.configuration_size(), "x"), R.data());
+            return vector(R);
+          },
+          py::arg("x"), "R(x) [n_equations].")
+      .def(
+          "evaluate_jacobian",
+          [](System& s, const DoubleArray& x) {
+            std::vector<double> R(s.equation_count());
+            auto J = matrix<double>(s.equation_count(), s.tangent_size());
+            s.linearize(checked_vector(x, s.configuration_size(), "x"), R.data(), J.mutable_data());
+            return J;
+          },
+          py::arg("x"), "J(x) [n_equations x tangent_size], derivative of R(x (+) v) at v = 0.")
+      .def(
+          "integrate",
+          [](const System& s, const DoubleArray& x, const DoubleArray& v) {
+            std::vector<double> out(s.configuration_size());
+            s.integrate(checked_vector(x, s.configuration_size(), "x"), checked_vector(v, s.tangent_size(), "v"),
+                        out.data());
+            return vector(out);
+          },
+          py::arg("x"), py::arg("v"), "x (+) v [configuration_size].")
+      .def(
+          "difference",
+          [](const System& s, const DoubleArray& x0, const DoubleArray& x1) {
+            std::vector<double> out(s.tangent_size());
+            s.difference(checked_vector(x0, s.configuration_size(), "x0"),
+                         checked_vector(x1, s.configuration_size(), "x1"), out.data());
+            return vector(out);
+          },
+          py::arg("x0"), py::arg("x1"), "x1 (-) x0 [tangent_size].")
+      .def(
+          "embed",
+          [](const System& s, const DoubleArray& x) {
+            std::vector<double> out(s.embedding_size());
+            s.embed(checked_vector(x, s.configuration_size(), "x"), out.data());
+            return vector(out);
+          },
+          py::arg("x"), "Euclidean image of x, by which charts are looked up.")
+      .def(
+          "slack",
+          [](const System& s, const DoubleArray& x) {
+            std::vector<double> out(s.bound_count());
+            s.slack(checked_vector(x, s.configuration_size(), "x"), out.data());
+            return vector(out);
+          },
+          py::arg("x"), "Distance of x from each bound; negative outside.");
   py::class_<PythonSystem, System, py::smart_holder>(module, "PythonSystem", "Base of systems written in Python.")
       .def(py::init<int, int, const DoubleArray&, const DoubleArray&>(), py::arg("n_variables"), py::arg("n_equations"),
            py::arg("lower"), py::arg("upper"));
-  py::class_<Sphere, System, py::smart_holder>(module, "Sphere", "The unit sphere in R^n.").def(py::init<int>(), py::arg("n"));
+  py::class_<Sphere, System, py::smart_holder>(module, "Sphere", "The unit sphere in R^n.")
+      .def(py::init<int>(), py::arg("n"));
   py::class_<Torus, System, py::smart_holder>(module, "Torus", "A torus in R^3.")
       .def(py::init<double, double>(), py::arg("major_radius"), py::arg("minor_radius"));
-  py::class_<Angles, System, py::smart_holder>(module, "Angles", "n angles, no equation.").def(py::init<int>(), py::arg("n"));
+  py::class_<Angles, System, py::smart_holder>(module, "Angles", "n angles, no equation.")
+      .def(py::init<int>(), py::arg("n"));
   py::class_<Rotations, System, py::smart_holder>(module, "Rotations", "All rotations, no equation.").def(py::init<>());
 }
 
 void bind_parts(py::module_& module) {
   py::class_<Polytope>(module, "Polytope", "A convex polytope in R^k: a box, cut by half-spaces.")
       .def(py::init<int, double>(), py::arg("dimension"), py::arg("half_width"))
-      .def("cut", [](Polytope& p, const DoubleArray& normal, double offset, int tag) {
-        const double* n = checked_vector(normal, p.dimension(), "normal");
-        if (!(offset >= 0.0)) throw Error("offset must not be negative: a polytope keeps the origin");
-        return p.cut(n, offset, tag);
-      }, py::arg("normal"), py::arg("offset"), py::arg("tag"), "Keep normal . u <= offset; False if nothing is cut off.")
-      .def("contains", [](const Polytope& p, const DoubleArray& u, double tolerance) {
-        return p.contains(checked_vector(u, p.dimension(), "u"), tolerance);
-      }, py::arg("u"), py::arg("tolerance") = 0.0, "True when u is inside all half-spaces.")
-      .def_property_readonly("vertices", [](const Polytope& p) {
-        return copied(p.vertex(0), p.vertex_count(), p.dimension());
-      }, "Vertices [n x k].");
+      .def(
+          "cut",
+          [](Polytope& p, const DoubleArray& normal, double offset, int tag) {
+            const double* n = checked_vector(normal, p.dimension(), "normal");
+            if (!(offset >= 0.0)) throw Error("offset must not be negative: a polytope keeps the origin");
+            return p.cut(n, offset, tag);
+          },
+          py::arg("normal"), py::arg("offset"), py::arg("tag"),
+          "Keep normal . u <= offset; False if nothing is cut off.")
+      .def(
+          "contains",
+          [](const Polytope& p, const DoubleArray& u, double tolerance) {
+            return p.contains(checked_vector(u, p.dimension(), "u"), tolerance);
+          },
+          py::arg("u"), py::arg("tolerance") = 0.0, "True when u is inside all half-spaces.")
+      .def_property_readonly(
+          "vertices", [](const Polytope& p) { return copied(p.vertex(0), p.vertex_count(), p.dimension()); },
+          "Vertices [n x k].");
   py::class_<Neighbours>(module, "Neighbours", "Points that come one by one, and those within a distance of any point.")
       .def(py::init<int>(), py::arg("size"))
-      .def("insert", [](Neighbours& t, const DoubleArray& point, int size) { t.insert(checked_vector(point, size, "point")); },
-           py::arg("point"), py::arg("size"), "Add a point [size].")
-      .def("within", [](const Neighbours& t, const DoubleArray& point, double distance, int size) {
-        std::vector<int> out;
-        t.within(checked_vector(point, size, "point"), distance, out);
-        return out;
-      }, py::arg("point"), py::arg("distance"), py::arg("size"), "Numbers of the points within a distance, ascending.");
+      .def(
+          "insert",
+          [](Neighbours& t, const DoubleArray& point, int size) { t.insert(checked_vector(point, size, "point")); },
+          py::arg("point"), py::arg("size"), "Add a point [size].")
+      .def(
+          "within",
+          [](const Neighbours& t, const DoubleArray& point, double distance, int size) {
+            std::vector<int> out;
+            t.within(checked_vector(point, size, "point"), distance, out);
+            return out;
+          },
+          py::arg("point"), py::arg("distance"), py::arg("size"),
+          "Numbers of the points within a distance, ascending.");
 }
 
 }  // namespace
@@ -229,28 +269,33 @@ void bind_continuation(py::module_& module) {
              return std::make_unique<Atlas>(system, checked_vector(x0, system.configuration_size(), "x0"), options);
            }),
            py::arg("system"), py::arg("x0"), py::arg("radius"), py::arg("epsilon"), py::keep_alive<1, 2>())
-      .def("expand", &Atlas::expand, py::arg("chart_limit"), py::arg("seconds"), py::call_guard<py::gil_scoped_release>(),
+      .def("expand", &Atlas::expand, py::arg("chart_limit"), py::arg("seconds"),
+           py::call_guard<py::gil_scoped_release>(),
            "Expand until complete, the limit of charts is reached, or the seconds have passed.")
       .def_property_readonly("complete", &Atlas::complete, "True when no chart is left to expand.")
       .def_property_readonly("n_open", &Atlas::open_count, "Charts still to be expanded.")
       .def_property_readonly("n_charts", &Atlas::count, "Charts so far.")
       .def_property_readonly("n_projections", &Atlas::projections, "Newton projections so far.")
       .def("arrays", &atlas_arrays, "The atlas as a dictionary of arrays.");
-  module.def("project", [](System& system, const DoubleArray& x, const DoubleArray& Phi, const DoubleArray& u) {
-    const int n = system.tangent_size(), k = system.dimension();
-    const double* center = checked_vector(x, system.configuration_size(), "x");
-    if (Phi.ndim() != 2 || Phi.shape(0) != k || Phi.shape(1) != n)
-      throw Error("the tangent basis must have shape (" + std::to_string(k) + ", " + std::to_string(n) + ")");
-    const double* coordinates = checked_vector(u, k, "u");
-    std::vector<double> step(n, 0.0), out(system.configuration_size());
-    for (int a = 0; a < k; ++a)
-      for (int c = 0; c < n; ++c) step[c] += coordinates[a] * Phi.data()[static_cast<py::ssize_t>(a) * n + c];
-    system.integrate(center, step.data(), out.data());
-    Newton newton(system, NewtonOptions());
-    if (newton.project(out.data(), Phi.data()) != Projection::converged) return py::object(py::none());
-    return py::object(vector(out));
-  }, py::arg("system"), py::arg("x"), py::arg("Phi"), py::arg("u"),
-     "Point of the manifold above u in the tangent space at x (eqs 14 and 15); None when Newton does not converge.");
+  module.def(
+      "project",
+      [](System& system, const DoubleArray& x, const DoubleArray& Phi, const DoubleArray& u) {
+        const int n = system.tangent_size(), k = system.dimension();
+        const double* center = checked_vector(x, system.configuration_size(), "x");
+        if (Phi.ndim() != 2 || Phi.shape(0) != k || Phi.shape(1) != n)
+          throw Error("the tangent basis must have shape (" + std::to_string(k) + ", " + std::to_string(n) + ")");
+        const double* coordinates = checked_vector(u, k, "u");
+        std::vector<double> step(n, 0.0), out(system.configuration_size());
+        for (int a = 0; a < k; ++a)
+          for (int c = 0; c < n; ++c) step[c] += coordinates[a] * Phi.data()[static_cast<py::ssize_t>(a) * n + c];
+        system.integrate(center, step.data(), out.data());
+        Newton newton(system, NewtonOptions());
+        if (newton.project(out.data(), Phi.data()) != Projection::converged) return py::object(py::none());
+        return py::object(vector(out));
+      },
+      py::arg("system"), py::arg("x"), py::arg("Phi"), py::arg("u"),
+      "Point of the manifold above u in the tangent space at x (eqs 14 and 15); None when Newton does not "
+      "converge.");
 }
 
 }  // namespace graspatlas

@@ -1,7 +1,8 @@
-#include <Eigen/LU>
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 
+#include <Eigen/LU>
+#include <map>
 #include <string>
 
 #include "bindings.hpp"
@@ -45,11 +46,12 @@ py::ssize_t checked_rows(const GraspSystem& system, const DoubleArray& X) {
   return X.shape(0);
 }
 
-py::dict grasp_arrays(GraspSystem& system, const DoubleArray& X) {
+ArrayTable grasp_arrays(GraspSystem& system, const DoubleArray& X) {
   const py::ssize_t n = checked_rows(system, X), m = system.contact_count(), dof = system.object_dof();
   const py::ssize_t hand = system.model().hand_v_size();
   Stack hand_points = stack({n, m, 3}), object_points = stack({n, m, 3}), hand_normals = stack({n, m, 3}),
-        object_normals = stack({n, m, 3}), J = stack({n, 3 * m, hand}), G = stack({n, dof, 3 * m}), T = stack({n, 4, 4});
+        object_normals = stack({n, m, 3}), J = stack({n, 3 * m, hand}), G = stack({n, dof, 3 * m}),
+        T = stack({n, 4, 4});
   std::vector<ContactPoint> contacts(m);
   RowMatrix J_one(3 * m, hand), Gt_one(3 * m, dof);
   using Map3 = Eigen::Map<Eigen::Vector3d>;
@@ -71,7 +73,7 @@ py::dict grasp_arrays(GraspSystem& system, const DoubleArray& X) {
     Eigen::Map<RowMatrix>(J.mutable_data(i, 0, 0), 3 * m, hand) = J_one;
     Eigen::Map<RowMatrix>(G.mutable_data(i, 0, 0), dof, 3 * m) = Gt_one.transpose();
   }
-  py::dict out;
+  ArrayTable out;
   out["T_palm_object"] = T;
   out["hand_points"] = hand_points;
   out["object_points"] = object_points;
@@ -92,7 +94,8 @@ void bind_model(py::module_& module) {
   py::class_<Model, py::smart_holder>(module, "Model", "Hand and object as one kinematic tree.")
       .def(py::init([](const std::string& urdf, const std::string& object) {
              return std::make_unique<Model>(urdf, object_joint_from(object));
-           }), py::arg("urdf"), py::arg("object_joint"))
+           }),
+           py::arg("urdf"), py::arg("object_joint"))
       .def_property_readonly("q_size", &Model::q_size, "Numbers in q.")
       .def_property_readonly("v_size", &Model::v_size, "Numbers in a velocity.")
       .def_property_readonly("hand_q_size", &Model::hand_q_size, "Numbers in the hand's part of q.")
@@ -101,50 +104,61 @@ void bind_model(py::module_& module) {
       .def_property_readonly("lower_limits", &Model::lower_limits, "Lower joint limits [hand_q_size].")
       .def_property_readonly("upper_limits", &Model::upper_limits, "Upper joint limits [hand_q_size].")
       .def_property_readonly("neutral", &Model::neutral, "Neutral configuration [q_size].")
-      .def_property_readonly("frames", [](const Model& model) {
-        py::dict out;
-        for (const FrameInfo& frame : model.hand_frames())
-          out[py::str(frame.name)] = py::make_tuple(frame.joint, matrix_from(frame.placement));
-        return out;
-      }, "Frame name -> (joint, placement of the frame in the joint [4 x 4]).")
+      .def_property_readonly(
+          "frames",
+          [](const Model& model) {
+            std::map<std::string, std::pair<int, Eigen::Matrix4d>> out;
+            for (const FrameInfo& frame : model.hand_frames())
+              out[frame.name] = {frame.joint, matrix_from(frame.placement)};
+            return out;
+          },
+          "Frame name -> (joint, placement of the frame in the joint [4 x 4]).")
       .def_property_readonly("object_joint", &Model::object_joint, "Joint that carries the object; -1 without one.")
-      .def("frame_placements", [](Model& model, const DoubleArray& q) {
-        model.update(checked_vector(q, model.q_size(), "q"), false);
-        py::dict out;
-        for (const FrameInfo& frame : model.hand_frames())
-          out[py::str(frame.name)] = Eigen::Matrix4d(matrix_from(model.placement(frame.joint)) * matrix_from(frame.placement));
-        return out;
-      }, py::arg("q"), "Frame name -> T_world_frame [4 x 4] at q.");
+      .def(
+          "frame_placements",
+          [](Model& model, const DoubleArray& q) {
+            model.update(checked_vector(q, model.q_size(), "q"), false);
+            std::map<std::string, Eigen::Matrix4d> out;
+            for (const FrameInfo& frame : model.hand_frames())
+              out[frame.name] = matrix_from(model.placement(frame.joint)) * matrix_from(frame.placement);
+            return out;
+          },
+          py::arg("q"), "Frame name -> T_world_frame [4 x 4] at q.");
 }
 
 void bind_patches(py::module_& module) {
   py::class_<Patch, py::smart_holder>(module, "Patch", "A parametrised piece of surface.")
       .def_property_readonly("u_is_angle", &Patch::u_is_angle, "True when u is an angle, False when it is a length.")
-      .def("evaluate", [](const Patch& patch, double u, double v) {
-        PatchPoint p;
-        patch.evaluate(u, v, p);
-        py::dict out;
-        out["o"] = p.o, out["m"] = p.m, out["a"] = p.a, out["b"] = p.b;
-        out["o_u"] = p.o_u, out["m_u"] = p.m_u, out["a_u"] = p.a_u, out["b_u"] = p.b_u;
-        out["o_v"] = p.o_v, out["m_v"] = p.m_v, out["a_v"] = p.a_v, out["b_v"] = p.b_v;
-        return out;
-      }, py::arg("u"), py::arg("v"), "Point o, normal m, tangents a and b, and their derivatives by u and v.");
+      .def(
+          "evaluate",
+          [](const Patch& patch, double u, double v) {
+            PatchPoint p;
+            patch.evaluate(u, v, p);
+            std::map<std::string, Eigen::Vector3d> out;
+            out["o"] = p.o, out["m"] = p.m, out["a"] = p.a, out["b"] = p.b;
+            out["o_u"] = p.o_u, out["m_u"] = p.m_u, out["a_u"] = p.a_u, out["b_u"] = p.b_u;
+            out["o_v"] = p.o_v, out["m_v"] = p.m_v, out["a_v"] = p.a_v, out["b_v"] = p.b_v;
+            return out;
+          },
+          py::arg("u"), py::arg("v"), "Point o, normal m, tangents a and b, and their derivatives by u and v.");
   py::class_<PlanePatch, Patch, py::smart_holder>(module, "PlanePatch", "The x-z plane of a placement, normal y.")
-      .def(py::init([](const Eigen::Matrix4d& T) { return std::make_unique<PlanePatch>(placement_from(T)); }), py::arg("T"));
+      .def(py::init([](const Eigen::Matrix4d& T) { return std::make_unique<PlanePatch>(placement_from(T)); }),
+           py::arg("T"));
   py::class_<RevolutionPatch, Patch, py::smart_holder>(module, "RevolutionPatch",
                                                        "A surface of revolution about y of a placement.")
       .def(py::init([](const Eigen::Matrix4d& T, const std::vector<double>& breaks,
                        const Eigen::Matrix<double, Eigen::Dynamic, 4>& coefficients) {
              return std::make_unique<RevolutionPatch>(placement_from(T), breaks, coefficients);
-           }), py::arg("T"), py::arg("breaks"), py::arg("coefficients"));
+           }),
+           py::arg("T"), py::arg("breaks"), py::arg("coefficients"));
   py::class_<PatchParameter>(module, "PatchParameter", "One parameter of a patch: frozen, or an unknown.")
       .def(py::init<bool, double, bool, double, double>(), py::arg("free"), py::arg("value"), py::arg("periodic"),
            py::arg("lower"), py::arg("upper"));
   py::class_<ContactSide>(module, "ContactSide", "A patch on a joint of the model.")
-      .def(py::init([](int joint, const Eigen::Matrix4d& T, std::shared_ptr<Patch> patch, const PatchParameter& u,
-                       const PatchParameter& v) {
-             return ContactSide{joint, placement_from(T), std::move(patch), u, v};
-           }), py::arg("joint"), py::arg("T_joint_frame"), py::arg("patch"), py::arg("u"), py::arg("v"));
+      .def(py::init(
+               [](int joint, const Eigen::Matrix4d& T, std::shared_ptr<Patch> patch, const PatchParameter& u,
+                  const PatchParameter& v) { return ContactSide{joint, placement_from(T), std::move(patch), u, v}; }),
+           py::arg("joint"), py::arg("T_joint_frame"), py::arg("patch"), py::arg("u"), py::arg("v"));
 }
 
 }  // namespace
@@ -152,13 +166,15 @@ void bind_patches(py::module_& module) {
 void bind_grasp(py::module_& module) {
   bind_model(module);
   bind_patches(module);
-  py::class_<GraspSystem, System, py::smart_holder>(module, "GraspSystem", "The relevant grasps R of a hand and an object.")
+  py::class_<GraspSystem, System, py::smart_holder>(module, "GraspSystem",
+                                                    "The relevant grasps R of a hand and an object.")
       .def(py::init([](std::shared_ptr<Model> model, const std::vector<std::pair<ContactSide, ContactSide>>& sides,
                        const Matrix& motions, double length_scale, const std::vector<double>& lower,
                        const std::vector<double>& upper) {
              std::vector<Contact> contacts;
              for (const auto& [hand, object] : sides) contacts.push_back({hand, object});
-             return std::make_unique<GraspSystem>(std::move(model), std::move(contacts), motions, length_scale, lower, upper);
+             return std::make_unique<GraspSystem>(std::move(model), std::move(contacts), motions, length_scale, lower,
+                                                  upper);
            }),
            py::arg("model"), py::arg("contacts"), py::arg("motions"), py::arg("length_scale"), py::arg("lower"),
            py::arg("upper"))
@@ -167,7 +183,8 @@ void bind_grasp(py::module_& module) {
       .def_property_readonly("object_dof", &GraspSystem::object_dof, "Degrees of freedom of the object.")
       .def_property_readonly("bound_names", &GraspSystem::bound_names, "Name of each bound, in the order of slack.")
       .def("grasp_arrays", &grasp_arrays, py::arg("X"),
-           "For grasps X [n x configuration_size]: T_palm_object, contact points and normals, J and G, as arrays.");
+           "For grasps X [n x configuration_size]: T_palm_object, contact points and normals, J and G, as "
+           "arrays.");
 }
 
 }  // namespace graspatlas

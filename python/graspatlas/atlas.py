@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from enum import Enum
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -143,7 +144,7 @@ class Atlas:
         pairs = np.concatenate([self.neighbour_pairs, self.neighbour_pairs[:, ::-1]]).astype(np.int64)
         pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
         ends = np.searchsorted(pairs[:, 0], np.arange(self.n_charts + 1))
-        return [pairs[a:b, 1] for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        return [pairs[a:b, 1] for a, b in pairwise(ends)]
 
     @cached_property
     def _index(self) -> cKDTree:
@@ -224,7 +225,8 @@ class Atlas:
         ring = np.argsort(np.arctan2(normals[:, 1], normals[:, 0]))
         after = np.roll(ring, -1)
         corners = np.linalg.solve(
-            np.stack([normals[ring], normals[after]], axis=1), np.stack([offsets[ring], offsets[after]], axis=1)[..., None]
+            np.stack([normals[ring], normals[after]], axis=1),
+            np.stack([offsets[ring], offsets[after]], axis=1)[..., None],
         )[..., 0]
         lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
         return [int(tags[f]) for f, length in zip(ring, lengths, strict=True) if length > SHORT_FACET * self.radius]

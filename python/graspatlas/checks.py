@@ -98,7 +98,11 @@ def _atlas_checks(atlas: Atlas, system: AnySystem) -> Iterator[Check]:
         np.abs(system.evaluate_jacobian(x) @ basis.T).max(initial=0.0)
         for x, basis in zip(atlas.centers, atlas.bases, strict=True)
     ]
-    yield Check("tangent bases lie in the null space of the Jacobian to", float(np.max(slopes)), TANGENT_TOLERANCE)
+    yield Check(
+        "tangent bases lie in the null space of the Jacobian to",
+        float(np.max(slopes)),
+        TANGENT_TOLERANCE,
+    )
     yield from _neighbour_checks(atlas, system)
     if atlas.complete:
         norms = np.linalg.norm(atlas.vertices, axis=1)
@@ -113,7 +117,11 @@ def _neighbour_checks(atlas: Atlas, system: AnySystem) -> Iterator[Check]:
     d = np.array(list(pairs.values())).reshape(len(pairs), system.tangent_size)
     images = [np.einsum("nkv,nv->nk", atlas.bases[c], d) for c in (i, j)]
     off = [np.sqrt(np.maximum((d * d).sum(axis=1) - (p * p).sum(axis=1), 0.0)) for p in images]
-    yield Check("neighbours are off each other's tangent space by", float(np.max(off, initial=0.0)), atlas.epsilon)
+    yield Check(
+        "neighbours are off each other's tangent space by",
+        float(np.max(off, initial=0.0)),
+        atlas.epsilon,
+    )
     M = np.einsum("nav,nbv->nab", atlas.bases[i], atlas.bases[j])
     cosines = np.linalg.svd(M, compute_uv=False).min(axis=1, initial=1.0)
     widest = float(1.0 - cosines.min(initial=1.0))
@@ -137,8 +145,8 @@ def _neighbour_checks(atlas: Atlas, system: AnySystem) -> Iterator[Check]:
 def check_result(result: Result) -> CheckReport:
     """Verify a result from the problem that it carries.
 
-    Beside :func:`check_atlas`: the frozen hand motions of eq (13), opposite normals, a closed atlas, the qualities (when
-    the index has a name) and the choice of the best.
+    Beside :func:`check_atlas`: the frozen hand motions of eq (13), opposite normals, a closed atlas, the qualities
+    (when the index has a name) and the choice of the best.
 
     Args:
         result: The result.
@@ -154,15 +162,23 @@ def _result_checks(result: Result) -> Iterator[Check]:
     system = problem.system(result.dimension)
     yield from _atlas_checks(atlas, system)
     frozen = problem.frozen_residual(atlas.centers, result.dimension)
-    yield Check("frozen hand motions, eq (13), are off by", float(np.abs(frozen).max(initial=0.0)), RESIDUAL_TOLERANCE)
+    yield Check(
+        "frozen hand motions, eq (13), are off by",
+        float(np.abs(frozen).max(initial=0.0)),
+        RESIDUAL_TOLERANCE,
+    )
     start = float(np.abs(system.difference(problem.x1_array, atlas.centers[0])).max())
     yield Check("the first chart is off x1 by [rad or length_scale]", start, 1.0)
     grasps = Grasps(problem, atlas.centers, system)
     arrays = system.grasp_arrays(grasps.x)
     cosines = np.einsum("nmc,nmc->nm", arrays["hand_normals"], arrays["object_normals"])
-    yield Check("cosine between hand's and object's normals", float(cosines.max()), -1.0 + 1e-9)
+    yield Check("cosine between the normals of hand and object", float(cosines.max()), -1.0 + 1e-9)
     for reason in ("curvature", "not_converged"):
-        yield Check(f"vertices closed for {reason.replace('_', ' ')}", float(atlas.closed_vertices[reason]), 0.0)
+        yield Check(
+            f"vertices closed for {reason.replace('_', ' ')}",
+            float(atlas.closed_vertices[reason]),
+            0.0,
+        )
     if result.quality in INDICES:
         again = evaluate(result.quality, grasps)
         scale = np.maximum(np.abs(again), 1e-12)

@@ -8,6 +8,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from graspatlas import __version__
 from graspatlas.atlas import Status
 from graspatlas.errors import GraspAtlasError
@@ -56,8 +59,18 @@ def _parser() -> argparse.ArgumentParser:
     best = commands.add_parser("optimize", help="trace all relevant grasps of a problem and find the best one")
     best.add_argument("problem", help="name of a bundled problem, or path of a problem file (.json)")
     best.add_argument("--dimension", type=int, metavar="K", help="dimension k of the set of relevant grasps")
-    best.add_argument("--radius", type=float, metavar="R", help="radius of a chart [rad, or lengths / length_scale]")
-    best.add_argument("--epsilon", type=float, metavar="E", help="how different neighbouring charts may be, 0 to 1")
+    best.add_argument(
+        "--radius",
+        type=float,
+        metavar="R",
+        help="radius of a chart [rad, or lengths / length_scale]",
+    )
+    best.add_argument(
+        "--epsilon",
+        type=float,
+        metavar="E",
+        help="how different neighbouring charts may be, 0 to 1",
+    )
     best.add_argument("--quality", metavar="NAME", help=f"quality index: {', '.join(INDICES)}")
     best.add_argument("--max-charts", type=int, metavar="N", help="cut the atlas short after N charts")
     best.add_argument("--max-seconds", type=float, metavar="S", help="cut the atlas short after S seconds")
@@ -120,7 +133,8 @@ def _report(result: Result, folder: Path | None) -> str:
     lines = [
         f"{summary['problem']}: {summary['n_charts']} charts of dimension {summary['dimension']} in "
         f"{seconds['atlas']:.3f} s, index in {seconds['quality']:.3f} s; {summary['status']}",
-        f"  {quality['name']}: best {quality['best']:.6g}, worst {quality['worst']:.6g}, first grasp {quality['at_x1']:.6g}",
+        f"  {quality['name']}: best {quality['best']:.6g}, worst {quality['worst']:.6g}, "
+        f"first grasp {quality['at_x1']:.6g}",
         f"  largest residual {summary['max_residual']:.1e}",
     ]
     if closed:
@@ -137,7 +151,7 @@ def _report(result: Result, folder: Path | None) -> str:
     return "\n".join(lines)
 
 
-def _row(values: Sequence[float]) -> str:
+def _row(values: NDArray[np.float64]) -> str:
     return "(" + ", ".join(f"{value:.4f}" for value in values) + ")"
 
 

@@ -65,9 +65,7 @@ class HandMotions:
         """
         X = np.asarray(samples, float)
         if X.ndim != 2 or X.shape[0] < 2 or X.shape[1] != len(joints):
-            raise GraspAtlasError(
-                f"samples must have shape (z, {len(joints)}) with z of at least 2, got {X.shape}"
-            )
+            raise GraspAtlasError(f"samples must have shape (z, {len(joints)}) with z of at least 2, got {X.shape}")
         return cls(tuple(joints), X.mean(axis=0), np.cov(X, rowvar=False).reshape(len(joints), -1))
 
     @property

@@ -48,7 +48,8 @@ def build_atlas(
         radius: r, of the ball that a chart may cover [units of the tangent space].
         epsilon: Largest distance between a chart and the manifold, and largest 1 - cosine between neighbouring tangent
             spaces; between 0 and 1.
-        max_charts, max_seconds: Limits after which the atlas is cut short; none by default.
+        max_charts: Number of charts after which the atlas is cut short; none by default.
+        max_seconds: Time after which the atlas is cut short; none by default.
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
     Returns:
@@ -69,12 +70,26 @@ def build_atlas(
     builder = _core.AtlasBuilder(system, _numbers("x0", x0), radius, epsilon)
     status = _grow(builder, charts, start + limit, progress)
     seconds = time.perf_counter() - start
-    return Atlas(system=system, radius=radius, epsilon=epsilon, status=status, seconds=seconds, **builder.arrays())
+    return Atlas(
+        system=system,
+        radius=radius,
+        epsilon=epsilon,
+        status=status,
+        seconds=seconds,
+        **builder.arrays(),
+    )
 
 
 def _grow(builder: _core.AtlasBuilder, max_charts: int, deadline: float, progress: bool | None) -> Status:
     shown = sys.stderr.isatty() if progress is None else progress
-    bar = tqdm(desc="atlas", unit=" charts", disable=not shown, delay=_QUIET_SECONDS, file=sys.stderr, initial=1)
+    bar = tqdm(
+        desc="atlas",
+        unit=" charts",
+        disable=not shown,
+        delay=_QUIET_SECONDS,
+        file=sys.stderr,
+        initial=1,
+    )
     try:
         while not builder.complete:
             remaining = deadline - time.perf_counter()
@@ -113,7 +128,9 @@ def optimize(
         radius: r, of a chart [rad, and lengths in units of ``problem.length_scale``].
         epsilon: See :func:`build_atlas`.
         quality: Name of an index, or a callable: see :mod:`graspatlas.quality`.
-        max_charts, max_seconds, progress: See :func:`build_atlas`.
+        max_charts: See :func:`build_atlas`.
+        max_seconds: See :func:`build_atlas`.
+        progress: See :func:`build_atlas`.
 
     Returns:
         The result: best and worst grasp, atlas, qualities and status. The best grasp is the best of all grasps that are

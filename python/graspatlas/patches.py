@@ -260,7 +260,7 @@ class Cone(_Turned):
 
     Attributes:
         heights: Two heights along the axis [m].
-        radii: The radius at each [m]; not both zero. Keep the apex out of ``v_interval``: the surface is singular there.
+        radii: The radius at each [m]; not both zero. Keep the apex, which is singular, out of ``v_interval``.
         origin, axis, u_axis, u_interval, v_interval: As for :class:`Cylinder`; v lies between the heights by default.
     """
 

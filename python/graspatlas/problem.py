@@ -89,7 +89,12 @@ class FirstGrasp:
     parameters: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        numbers = [*self.joints.values(), *self.object_xyz, *self.object_quat_xyzw, *(self.parameters or ())]
+        numbers = [
+            *self.joints.values(),
+            *self.object_xyz,
+            *self.object_quat_xyzw,
+            *(self.parameters or ()),
+        ]
         if not np.isfinite(np.asarray(numbers, float)).all():
             raise GraspAtlasError("x1 holds a number that is not finite")
         if len(self.object_xyz) != 3 or len(self.object_quat_xyzw) != 4:
@@ -176,7 +181,9 @@ class Problem:
                 for name, s in zip(self.full_system.bound_names, slack, strict=True)
                 if s < -LIMIT_TOLERANCE
             ]
-            raise GraspAtlasError(f"x1 of problem '{self.name}' breaks the {', the '.join(broken)} [rad or length_scale]")
+            raise GraspAtlasError(
+                f"x1 of problem '{self.name}' breaks the {', the '.join(broken)} [rad or length_scale]"
+            )
 
     @cached_property
     def full_system(self) -> _core.GraspSystem:
@@ -191,7 +198,7 @@ class Problem:
         return system.tangent_size - int((singular > 1e-8 * singular[0]).sum())
 
     def frozen_motions(self, dimension: int) -> int:
-        """s = t - k: how many hand motions are frozen for a manifold of dimension k (eq 12).
+        """How many hand motions are frozen for a manifold of dimension k: s = t - k (eq 12).
 
         Raises:
             GraspAtlasError: If `dimension` is not between 1 and t, or there are no hand motions to freeze.
@@ -328,7 +335,10 @@ class Problem:
             "name": self.name,
             "description": self.description,
             "source": self.source,
-            "hand": {**_body_dict(self.hand), "limits": {k: list(v) for k, v in self.hand.limits.items()}},
+            "hand": {
+                **_body_dict(self.hand),
+                "limits": {k: list(v) for k, v in self.hand.limits.items()},
+            },
             "object": _body_dict(self.object),
             "length_scale": self.length_scale,
             "contacts": [contact.to_dict() for contact in self.contacts],
@@ -409,7 +419,12 @@ def _inverse(T: Array) -> Array:
 
 
 def _body_dict(body: Body) -> dict[str, Any]:
-    return {"name": body.name, "urdf": body.urdf_path, "urdf_text": body.urdf, "srdf_text": body.srdf}
+    return {
+        "name": body.name,
+        "urdf": body.urdf_path,
+        "urdf_text": body.urdf,
+        "srdf_text": body.srdf,
+    }
 
 
 def _body_arguments(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
@@ -423,7 +438,13 @@ def _body_arguments(data: Mapping[str, Any], folder: Path | None) -> dict[str, A
         except GraspAtlasError:
             found = (str(robots_folder()),)
         text, srdf = str(data["urdf_text"]), str(data.get("srdf_text") or "")
-        return {"name": str(name), "urdf": text, "urdf_path": str(data["urdf"]), "package_dirs": found, "srdf": srdf}
+        return {
+            "name": str(name),
+            "urdf": text,
+            "urdf_path": str(data["urdf"]),
+            "package_dirs": found,
+            "srdf": srdf,
+        }
     return vars(Body.from_urdf(data["urdf"], name=name, srdf=data.get("srdf"), folder=folder))
 
 

@@ -151,7 +151,10 @@ class Result:
             descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
             with os.fdopen(descriptor, "wb") as stream:
                 np.savez_compressed(
-                    stream, header=json.dumps(header), qualities=self.qualities, **self.atlas.to_arrays()
+                    stream,
+                    header=json.dumps(header),
+                    qualities=self.qualities,
+                    **self.atlas.to_arrays(),
                 )
             os.chmod(temporary, 0o644)
             os.replace(temporary, target)
@@ -184,9 +187,7 @@ def load_result(path: str | os.PathLike[str]) -> Result:
     except OSError as error:
         raise GraspAtlasError(f"cannot read result '{source}': {error.strerror or error}") from None
     except (ValueError, KeyError, EOFError, zipfile.BadZipFile, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
-        raise GraspAtlasError(
-            f"'{source}' is damaged or not a graspatlas result ({error}); compute it again"
-        ) from None
+        raise GraspAtlasError(f"'{source}' is damaged or not a graspatlas result ({error}); compute it again") from None
     if header.get("version") != FORMAT_VERSION:
         raise GraspAtlasError(
             f"result '{source}' has version {header.get('version')}, this graspatlas reads {FORMAT_VERSION}"

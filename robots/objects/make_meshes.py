@@ -40,9 +40,7 @@ SEGMENTS = 72
 
 def can_label() -> Mesh:
     """Return the coloured wall of the can."""
-    return lathe(
-        [(-0.03753, 0.0), (-0.03753, 0.02229), (0.02546, 0.02229), (0.02546, 0.0)], SEGMENTS
-    )
+    return lathe([(-0.03753, 0.0), (-0.03753, 0.02229), (0.02546, 0.02229), (0.02546, 0.0)], SEGMENTS)
 
 
 def can_wave() -> Mesh:
@@ -65,9 +63,7 @@ def _band(u: Array, low: Array, high: Array, radius: float = 0.02234) -> Mesh:
     i, j = np.divmod(np.arange(rows * columns), columns)
     k, n = (j + 1) % columns, (i + 1) % rows
     a, b, c, d = i * columns + j, i * columns + k, n * columns + k, n * columns + j
-    return Mesh(
-        ring.reshape(-1, 3), np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
-    )
+    return Mesh(ring.reshape(-1, 3), np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])]))
 
 
 def can_bottom() -> Mesh:

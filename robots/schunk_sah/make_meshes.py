@@ -198,9 +198,7 @@ def distal_pad() -> Mesh:
 
 def proximal_pad() -> Mesh:
     """Return the rubber on a proximal body."""
-    return cushion(
-        PROXIMAL, PROXIMAL_COVER, (0.0174, 0.0560), (0.25 * np.pi, 0.75 * np.pi), (20, 18)
-    )
+    return cushion(PROXIMAL, PROXIMAL_COVER, (0.0174, 0.0560), (0.25 * np.pi, 0.75 * np.pi), (20, 18))
 
 
 KNUCKLE_TRUNK = Loft(

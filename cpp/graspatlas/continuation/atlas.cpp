@@ -49,8 +49,10 @@ Atlas::Atlas(System& system, const double* x0, const AtlasOptions& options)
     case Projection::converged:
       break;
     case Projection::singular:
-      throw Error("the Jacobian at x0 has lost rank: the equations are redundant there, so the solutions near x0 are "
-                  "not a manifold of dimension " + std::to_string(k_) + "; drop redundant equations or move x0");
+      throw Error(
+          "the Jacobian at x0 has lost rank: the equations are redundant there, so the solutions near x0 are "
+          "not a manifold of dimension " +
+          std::to_string(k_) + "; drop redundant equations or move x0");
     case Projection::not_converged:
       throw Error("x0 is not on the manifold and could not be projected onto it: residual " +
                   std::to_string(newton_.residual()));
@@ -162,7 +164,8 @@ void Atlas::cut_by_bounds(int i) {
   }
 }
 
-// Eq (16) and Fig. 6b: two charts of equal radius cut each other at the bisector of the centre and the other's image.
+// Eq (16) and Fig. 6b: two charts of equal radius cut each other at the bisector of the centre and the
+// other's image.
 void Atlas::meet_neighbours(int j) {
   system_.embed(center(j), embedding_.data());
   index_.within(embedding_.data(), 2.0 * options_.radius, near_);

@@ -22,8 +22,9 @@ inline double project_displacement(const double* Phi, const double* d, int k, in
   return squared > 0.0 ? squared : 0.0;
 }
 
-/// Eq (18): true when the smallest singular value of Phi_i Phi_j' is at least `cosine` >= 0, that is when no direction
-/// of one tangent space makes a larger angle with the other than its arc cosine. `work` holds k x k numbers.
+/// Eq (18): true when the smallest singular value of Phi_i Phi_j' is at least `cosine` >= 0, that is when no
+/// direction of one tangent space makes a larger angle with the other than its arc cosine. `work` holds k x k
+/// numbers.
 ///
 /// The test is that M M' - cosine^2 I has a Cholesky factor, which needs no singular values.
 inline bool tangent_spaces_agree(const double* Phi_i, const double* Phi_j, int k, int n, double cosine, double* work) {

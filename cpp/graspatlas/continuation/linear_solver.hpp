@@ -6,7 +6,8 @@ namespace graspatlas {
 
 /// LU factorisation with partial pivoting of one square matrix after another of the same small size.
 ///
-/// Matrices of 10 to 40 rows are factorised millions of times, so the storage is kept and rows are contiguous.
+/// Matrices of 10 to 40 rows are factorised millions of times, so the storage is kept and rows are
+/// contiguous.
 class LinearSolver {
  public:
   explicit LinearSolver(int size);
@@ -23,8 +24,8 @@ class LinearSolver {
  private:
   int size_, stride_;
   std::vector<double> storage_;
-  std::vector<double*> rows_;   // rows in pivoted order
-  std::vector<int> origin_;     // origin_[i]: index of the original row that stands at i
+  std::vector<double*> rows_;  // rows in pivoted order
+  std::vector<int> origin_;    // origin_[i]: index of the original row that stands at i
   mutable std::vector<double> permuted_;
 };
 

@@ -41,7 +41,8 @@ void Neighbours::insert(const double* point) {
     nodes_[root_].bucket = new_bucket();
   }
   int node = root_, parent = -1;
-  // Highest node that this insertion makes lopsided, and its parent; a full leaf at the end is split the same way.
+  // Highest node that this insertion makes lopsided, and its parent; a full leaf at the end is split the same
+  // way.
   int lopsided = -1, lopsided_parent = -1;
   while (nodes_[node].axis >= 0) {
     Node& n = nodes_[node];

@@ -7,8 +7,9 @@ namespace graspatlas {
 
 /// Points of R^size that come one by one, and those within a distance of any point.
 ///
-/// A k-d tree with buckets. A subtree that has grown lopsided is rebuilt, so the depth stays logarithmic whatever the
-/// order of the points: an insertion costs O(log^2 n) amortised, and a search visits the cells that the ball meets.
+/// A k-d tree with buckets. A subtree that has grown lopsided is rebuilt, so the depth stays logarithmic
+/// whatever the order of the points: an insertion costs O(log^2 n) amortised, and a search visits the cells
+/// that the ball meets.
 class Neighbours {
  public:
   explicit Neighbours(int size);

@@ -8,7 +8,8 @@ namespace graspatlas {
 
 namespace {
 
-// Below this residual the factorisation serves for the remaining steps, which converge at once, and for the tangent basis.
+// Below this residual the factorisation serves for the remaining steps, which converge at once, and for the
+// tangent basis.
 constexpr double kNearlyZero = 1e-6;
 // A Jacobian whose smallest singular value is this far below its largest has lost rank.
 constexpr double kRankTolerance = 1e-9;
@@ -71,7 +72,8 @@ bool Newton::tangent_basis(double* Phi) {
     std::fill_n(row, n, 0.0);
     row[equations + i] = 1.0;
     solver_.solve(row);
-    // The factorisation may be that of a point nearby: one step of iterative refinement with the Jacobian here.
+    // The factorisation may be that of a point nearby: one step of iterative refinement with the Jacobian
+    // here.
     for (int e = 0; e < equations; ++e) {
       const double* gradient = &J_[static_cast<std::size_t>(e) * n];
       double dot = 0.0;
@@ -120,8 +122,8 @@ Projection Newton::project_freely(double* x, double* Phi) {
       return Projection::converged;
     }
     const Eigen::Map<const Vector> R(R_.data(), equations);
-    const Vector d = -(svd.matrixV().leftCols(equations) *
-                       ((svd.matrixU().transpose() * R).array() / s.array()).matrix());
+    const Vector d =
+        -(svd.matrixV().leftCols(equations) * ((svd.matrixU().transpose() * R).array() / s.array()).matrix());
     system_.integrate(x, d.data(), x);
   }
   return Projection::not_converged;

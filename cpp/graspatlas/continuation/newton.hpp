@@ -17,8 +17,8 @@ struct NewtonOptions {
 
 /// Orthogonal projection of points of a tangent space onto the manifold: eqs (14) and (15) of the paper.
 ///
-/// Solves [J(x); Phi'] d = -[R(x); 0] and moves x <- x (+) d until R(x) = 0, so that x stays above its starting point.
-/// The last factorisation is kept: it also gives the tangent basis at the point found.
+/// Solves [J(x); Phi'] d = -[R(x); 0] and moves x <- x (+) d until R(x) = 0, so that x stays above its
+/// starting point. The last factorisation is kept: it also gives the tangent basis at the point found.
 class Newton {
  public:
   Newton(System& system, NewtonOptions options);
@@ -31,7 +31,8 @@ class Newton {
   /// False when the tangent space is not well defined there.
   bool tangent_basis(double* Phi);
 
-  /// Move x onto the manifold by least-norm steps, and its tangent basis: for a first point, where no basis is known.
+  /// Move x onto the manifold by least-norm steps, and its tangent basis: for a first point, where no basis
+  /// is known.
   Projection project_freely(double* x, double* Phi);
 
   double residual() const { return residual_; }  ///< largest entry of |R(x)| at the last point

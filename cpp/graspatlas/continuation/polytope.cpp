@@ -21,50 +21,57 @@ bool share_edge(const std::uint16_t* a, const std::uint16_t* b, int k, std::uint
       shared[count++] = a[i];
       ++i;
       ++j;
+    } else if (a[i] > b[j]) {
+      ++j;
     } else {
-      if (a[i] < b[j]) {
-        if (++missed > 1) return false;
-        ++i;
-      } else {
-        ++j;
-      }
+      if (++missed > 1) return false;
+      ++i;
     }
   }
   return count == k - 1;
 }
 
+// True when at least `count` bits are set.
+inline bool at_least(std::uint64_t bits, int count) {
+  for (; count > 1 && bits; --count) bits &= bits - 1;
+  return bits != 0 || count <= 0;
+}
+
 // Scratch of `cut`, one for each thread: no allocation once it has grown.
-thread_local std::vector<double> signed_distance;
-thread_local std::vector<std::uint16_t> shared_facets;
+struct Scratch {
+  std::vector<double> signed_distance;
+  std::vector<std::uint16_t> shared_facets;
+  std::vector<int> inside, outside;
+};
+thread_local Scratch thread_scratch;
 
 }  // namespace
 
 Polytope::Polytope(int dimension, double half_width) : k_(dimension) {
-  if (dimension < 1 || dimension > 12) throw Error("polytopes have 1 to 12 dimensions, not " + std::to_string(dimension));
-  std::vector<double> normal(k_, 0.0);
-  for (int f = 0; f < 2 * k_; ++f) {
-    normal[f / 2] = f % 2 ? 1.0 : -1.0;
-    new_facet(normal.data(), half_width, kBox);
-    normal[f / 2] = 0.0;
-  }
+  if (dimension < 1 || dimension > 12)
+    throw Error("polytopes have 1 to 12 dimensions, not " + std::to_string(dimension));
+  normals_.assign(2 * static_cast<std::size_t>(k_) * k_, 0.0);
+  for (int f = 0; f < 2 * k_; ++f) normals_[static_cast<std::size_t>(f) * k_ + f / 2] = f % 2 ? 1.0 : -1.0;
+  offsets_.assign(2 * k_, half_width);
+  tags_.assign(2 * k_, kBox);
   const int corners = 1 << k_;
+  uses_.assign(2 * k_, corners / 2);
   state_.assign(corners, 0);
-  vertices_.reserve(static_cast<std::size_t>(corners) * k_);
-  facets_.reserve(static_cast<std::size_t>(corners) * k_);
-  for (int corner = 0; corner < corners; ++corner)
+  for (int corner = 0; corner < corners; ++corner) {
+    std::uint64_t mask = 0;
     for (int axis = 0; axis < k_; ++axis) {
-      const int side = corner >> axis & 1;
+      const int side = corner >> axis & 1, facet = 2 * axis + side;
       vertices_.push_back(side ? half_width : -half_width);
-      facets_.push_back(static_cast<FacetIndex>(2 * axis + side));
-      ++uses_[2 * axis + side];
+      facets_.push_back(static_cast<FacetIndex>(facet));
+      mask |= std::uint64_t{1} << facet;
     }
+    masks_.push_back(mask);
+  }
 }
 
 int Polytope::new_facet(const double* normal, double offset, int tag) {
   int slot = 0;
-  while (slot < facet_slots() && (uses_[slot] > 0)) ++slot;
-  // The box is made before its vertices: its facets are not in use yet.
-  if (vertices_.empty()) slot = facet_slots();
+  while (slot < facet_slots() && uses_[slot] > 0) ++slot;
   if (slot == facet_slots()) {
     if (slot > std::numeric_limits<FacetIndex>::max()) throw Error("a polytope has too many facets");
     normals_.insert(normals_.end(), normal, normal + k_);
@@ -80,30 +87,36 @@ int Polytope::new_facet(const double* normal, double offset, int tag) {
 }
 
 bool Polytope::cut(const double* normal, double offset, int tag) {
+  Scratch& scratch = thread_scratch;
   const int count = vertex_count();
-  signed_distance.resize(count);
-  shared_facets.resize(k_);
-  bool any_outside = false, any_inside = false;
+  scratch.signed_distance.resize(count);
+  scratch.shared_facets.resize(k_);
+  double* signed_distance = scratch.signed_distance.data();
+  const double limit = offset + kOnPlane * (offset + 1.0);
+  int outside_count = 0;
   for (int i = 0; i < count; ++i) {
-    double s = -offset - kOnPlane * (offset + 1.0);
-    for (int c = 0; c < k_; ++c) s += normal[c] * vertices_[static_cast<std::size_t>(i) * k_ + c];
+    double s = -limit;
+    for (int c = 0; c < k_; ++c) s += normal[c] * vertex(i)[c];
     signed_distance[i] = s;
-    (s > 0.0 ? any_outside : any_inside) = true;
+    outside_count += s > 0.0;
   }
-  if (!any_outside || !any_inside) return false;
+  if (outside_count == 0 || outside_count == count) return false;
 
+  scratch.inside.clear();
+  scratch.outside.clear();
+  for (int i = 0; i < count; ++i) (signed_distance[i] > 0.0 ? scratch.outside : scratch.inside).push_back(i);
   const int facet = new_facet(normal, offset, tag);
-  for (int out = 0; out < count; ++out) {
-    if (signed_distance[out] <= 0.0) continue;
-    for (int in = 0; in < count; ++in) {
-      if (signed_distance[in] > 0.0) continue;
-      if (!share_edge(facets_at(in), facets_at(out), k_, shared_facets.data())) continue;
+  const bool masks_hold = facet_slots() <= kMaskBits;
+  for (const int out : scratch.outside)
+    for (const int in : scratch.inside) {
+      if (masks_hold && !at_least(masks_[in] & masks_[out], k_ - 1)) continue;
+      if (!share_edge(facets_at(in), facets_at(out), k_, scratch.shared_facets.data())) continue;
       const double fraction = signed_distance[in] / (signed_distance[in] - signed_distance[out]);
-      add_vertex_on_edge(in, out, fraction, shared_facets.data(), facet);
+      add_vertex_on_edge(in, out, fraction, scratch.shared_facets.data(), facet);
     }
-  }
-  signed_distance.resize(vertex_count(), -1.0);
-  remove_outside();
+  for (const int out : scratch.outside)
+    for (int c = 0; c < k_; ++c) --uses_[facets_at(out)[c]];
+  fill_gaps(scratch.outside);
   return true;
 }
 
@@ -119,39 +132,50 @@ void Polytope::add_vertex_on_edge(int inside, int outside, double fraction, cons
   for (; i < k_ - 1 && shared[i] < added; ++i) row[i] = shared[i];
   row[i] = added;
   for (; i < k_ - 1; ++i) row[i + 1] = shared[i];
-  for (int c = 0; c < k_; ++c) ++uses_[row[c]];
+  std::uint64_t mask = 0;
+  for (int c = 0; c < k_; ++c) {
+    ++uses_[row[c]];
+    mask |= std::uint64_t{1} << (row[c] % kMaskBits);
+  }
+  masks_.push_back(mask);
   state_.push_back(0);
 }
 
-void Polytope::remove_outside() {
-  int kept = 0;
-  for (int i = 0; i < vertex_count(); ++i) {
-    const FacetIndex* row = facets_at(i);
-    if (signed_distance[i] > 0.0) {
-      for (int c = 0; c < k_; ++c) --uses_[row[c]];
-      continue;
+// Removes the vertices `gone` (ascending) by moving the last ones into their places.
+void Polytope::fill_gaps(const std::vector<int>& gone) {
+  int last = vertex_count() - 1, final_count = vertex_count() - static_cast<int>(gone.size());
+  std::size_t end = gone.size();
+  for (const int gap : gone) {
+    if (gap >= final_count) break;
+    while (end > 0 && gone[end - 1] == last) {
+      --end;
+      --last;
     }
-    if (kept != i) {
-      std::copy_n(vertex(i), k_, &vertices_[static_cast<std::size_t>(kept) * k_]);
-      std::copy_n(row, k_, &facets_[static_cast<std::size_t>(kept) * k_]);
-      state_[kept] = state_[i];
-    }
-    ++kept;
+    std::copy_n(vertex(last), k_, &vertices_[static_cast<std::size_t>(gap) * k_]);
+    std::copy_n(facets_at(last), k_, &facets_[static_cast<std::size_t>(gap) * k_]);
+    masks_[gap] = masks_[last];
+    state_[gap] = state_[last];
+    --last;
   }
-  vertices_.resize(static_cast<std::size_t>(kept) * k_);
-  facets_.resize(static_cast<std::size_t>(kept) * k_);
-  state_.resize(kept);
+  vertices_.resize(static_cast<std::size_t>(final_count) * k_);
+  facets_.resize(static_cast<std::size_t>(final_count) * k_);
+  masks_.resize(final_count);
+  state_.resize(final_count);
 }
 
 int Polytope::expandable_vertex(double radius) const {
-  const double limit = radius * radius;
+  double farthest = radius * radius;
+  int found = -1;
   for (int i = 0; i < vertex_count(); ++i) {
     if (state_[i]) continue;
     double squared = 0.0;
     for (int c = 0; c < k_; ++c) squared += vertex(i)[c] * vertex(i)[c];
-    if (squared > limit) return i;
+    if (squared > farthest) {
+      farthest = squared;
+      found = i;
+    }
   }
-  return -1;
+  return found;
 }
 
 bool Polytope::contains(const double* u, double tolerance) const {

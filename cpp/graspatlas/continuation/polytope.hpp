@@ -7,8 +7,9 @@ namespace graspatlas {
 
 /// A bounded convex polytope in R^k around the origin: a box that half-spaces cut smaller (paper, Fig. 6).
 ///
-/// It is kept simple in the sense of combinatorics: every vertex lies on exactly k facets, so two vertices share an edge
-/// exactly when they share k - 1 facets. A half-space through a vertex counts the vertex as inside, which keeps it so.
+/// It is kept simple in the sense of combinatorics: every vertex lies on exactly k facets, so two vertices
+/// share an edge exactly when they share k - 1 facets. A half-space through a vertex counts the vertex as
+/// inside, which keeps it so.
 class Polytope {
  public:
   /// Tag of the facets of the initial box; neighbours are tagged by their index, bounds by bound_tag.
@@ -43,17 +44,19 @@ class Polytope {
 
  private:
   using FacetIndex = std::uint16_t;
+  static constexpr int kMaskBits = 64;
 
   const FacetIndex* facets_at(int vertex) const { return &facets_[static_cast<std::size_t>(vertex) * k_]; }
   int new_facet(const double* normal, double offset, int tag);
   void add_vertex_on_edge(int inside, int outside, double fraction, const FacetIndex* shared, int facet);
-  void remove_outside();
+  void fill_gaps(const std::vector<int>& gone);
 
   int k_;
-  std::vector<double> vertices_;     // vertex_count x k
-  std::vector<FacetIndex> facets_;   // vertex_count x k, ascending in each row
-  std::vector<std::uint8_t> state_;  // vertex_count
-  std::vector<double> normals_;      // facet_slots x k
+  std::vector<double> vertices_;      // vertex_count x k
+  std::vector<FacetIndex> facets_;    // vertex_count x k, ascending in each row
+  std::vector<std::uint64_t> masks_;  // vertex_count: bit f for facet f, useful while there are at most kMaskBits slots
+  std::vector<std::uint8_t> state_;   // vertex_count
+  std::vector<double> normals_;       // facet_slots x k
   std::vector<double> offsets_;
   std::vector<int> tags_;
   std::vector<int> uses_;  // vertices on each facet

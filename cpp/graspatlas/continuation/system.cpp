@@ -12,8 +12,7 @@ System::System(int configuration_size, int tangent_size, int equation_count, int
       bound_normals_(0, tangent_size) {
   if (tangent_size < 1 || equation_count < 0 || equation_count >= tangent_size)
     throw Error("a system needs at least one variable and fewer equations than variables; got " +
-                std::to_string(tangent_size) + " variables and " + std::to_string(equation_count) +
-                " equations");
+                std::to_string(tangent_size) + " variables and " + std::to_string(equation_count) + " equations");
 }
 
 void System::integrate(const double* x, const double* v, double* out) const {

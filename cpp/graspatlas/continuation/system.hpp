@@ -15,15 +15,16 @@ using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// A system of equations R(x) = 0 whose solutions form a manifold of dimension k = tangent_size - equation_count.
+/// A system of equations R(x) = 0 whose solutions form a manifold of dimension k = tangent_size -
+/// equation_count.
 ///
-/// Points x live in a configuration space with its own addition: `integrate` computes x (+) v and `difference`
-/// computes v = x1 (-) x0, with the identities
+/// Points x live in a configuration space with its own addition: `integrate` computes x (+) v and
+/// `difference` computes v = x1 (-) x0, with the identities
 ///
 ///   difference(x, integrate(x, v)) = v  for small v,      difference(x1, x0) = -difference(x0, x1).
 ///
-/// In R^n these are plain addition and subtraction, the default. Every array below belongs to the caller and has the
-/// size named; a matrix is row-major.
+/// In R^n these are plain addition and subtraction, the default. Every array below belongs to the caller and
+/// has the size named; a matrix is row-major.
 class System {
  public:
   /// Sizes: numbers in a point, in a tangent vector, in R(x), and in the embedding of a point.
@@ -48,12 +49,13 @@ class System {
   /// x1 (-) x0 [tangent_size].
   virtual void difference(const double* x0, const double* x1, double* out) const;
 
-  /// A point of R^embedding_size such that Euclidean distances never exceed the norm of `difference`; two names of one
-  /// configuration (a quaternion and its negative) have one embedding. Charts are looked up by it.
+  /// A point of R^embedding_size such that Euclidean distances never exceed the norm of `difference`; two
+  /// names of one configuration (a quaternion and its negative) have one embedding. Charts are looked up by
+  /// it.
   virtual void embed(const double* x, double* out) const;
 
-  /// Bounds are linear to first order: slack(x (+) v) = slack(x) - B v + O(|v|^2), and a point is inside when no slack
-  /// is negative. B is [bound_count x tangent_size].
+  /// Bounds are linear to first order: slack(x (+) v) = slack(x) - B v + O(|v|^2), and a point is inside when
+  /// no slack is negative. B is [bound_count x tangent_size].
   int bound_count() const { return static_cast<int>(bound_normals_.rows()); }
   const RowMatrix& bound_normals() const { return bound_normals_; }
   virtual void slack(const double* x, double* out) const;

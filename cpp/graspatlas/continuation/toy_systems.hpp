@@ -34,7 +34,8 @@ class Angles : public System {
   void embed(const double* x, double* out) const override;
 };
 
-/// All rotations and no equation: SO(3) as unit quaternions (x, y, z, w), tangent vectors are body rotation vectors.
+/// All rotations and no equation: SO(3) as unit quaternions (x, y, z, w), tangent vectors are body rotation
+/// vectors.
 class Rotations : public System {
  public:
   Rotations();

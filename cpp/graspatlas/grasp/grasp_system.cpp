@@ -207,7 +207,8 @@ void GraspSystem::linearize(const double* x, double* R, double* J) {
     for (int v : model_->support(contact.hand.joint)) add_column(v, 1.0, hand.point, a_cross_m, b_cross_m, J);
     for (int v : model_->support(contact.object.joint)) add_column(v, -1.0, object.point, a_cross_m, b_cross_m, J);
 
-    // Free parameters: u and v of the hand's patch, then of the object's; lengths are in units of length_scale.
+    // Free parameters: u and v of the hand's patch, then of the object's; lengths are in units of
+    // length_scale.
     const auto fill = [&](double dx, double dy, double dz, double da, double db) {
       const double entries[kEquations] = {dx, dy, dz, da, db};
       for (int e = 0; e < kEquations; ++e) J[static_cast<std::ptrdiff_t>(e) * n + column] = entries[e];

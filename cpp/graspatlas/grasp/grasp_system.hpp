@@ -39,10 +39,11 @@ struct ContactPoint {
 
 /// The relevant grasps R (Sections II and III): contacts, hand motions, joint limits and patch intervals.
 ///
-/// A point is x = [q, w]: Pinocchio's configuration of hand and object, then the free patch parameters, contact by
-/// contact, hand before object, u before v. A tangent vector is [y, object, w]: y are velocities along the hand motions
-/// that are kept, so that eq (13), E_s' (q_hand - q_hand,1) = 0, holds by construction; lengths are divided by
-/// `length_scale`. Equations: for each contact three for the points (divided by length_scale) and two for the normals.
+/// A point is x = [q, w]: Pinocchio's configuration of hand and object, then the free patch parameters,
+/// contact by contact, hand before object, u before v. A tangent vector is [y, object, w]: y are velocities
+/// along the hand motions that are kept, so that eq (13), E_s' (q_hand - q_hand,1) = 0, holds by
+/// construction; lengths are divided by `length_scale`. Equations: for each contact three for the points
+/// (divided by length_scale) and two for the normals.
 class GraspSystem : public System {
  public:
   /// `motions` [hand_v_size x p] are the hand motions kept, orthonormal columns; the identity keeps them all.
@@ -66,8 +67,9 @@ class GraspSystem : public System {
 
   /// Contact points and normals at x [contact_count].
   void contact_points(const double* x, ContactPoint* out);
-  /// J [3m x hand_v_size]: joint velocities to velocities of the contact points, and Gt [3m x object dof], the grasp
-  /// matrix transposed: the object's velocity (linear at its origin, then angular; world axes) to those of the points.
+  /// J [3m x hand_v_size]: joint velocities to velocities of the contact points, and Gt [3m x object dof],
+  /// the grasp matrix transposed: the object's velocity (linear at its origin, then angular; world axes) to
+  /// those of the points.
   void grasp_matrices(const double* x, Eigen::Ref<RowMatrix> J, Eigen::Ref<RowMatrix> Gt);
   int object_dof() const;
 

@@ -49,8 +49,8 @@ Model::Model(const std::string& urdf, ObjectJoint object) : pinocchio_(new Pinoc
   }
   for (const pinocchio::Frame& frame : model.frames) {
     if (frame.type != pinocchio::BODY && frame.type != pinocchio::OP_FRAME) continue;
-    hand_frames_.push_back({frame.name, static_cast<int>(frame.parentJoint),
-                            {frame.placement.rotation(), frame.placement.translation()}});
+    hand_frames_.push_back(
+        {frame.name, static_cast<int>(frame.parentJoint), {frame.placement.rotation(), frame.placement.translation()}});
   }
   const auto identity = pinocchio::SE3::Identity();
   if (object == ObjectJoint::free_flyer)
@@ -71,8 +71,12 @@ Model::~Model() = default;
 int Model::q_size() const { return pinocchio_->model.nq; }
 int Model::v_size() const { return pinocchio_->model.nv; }
 
-std::vector<double> Model::lower_limits() const { return to_std(pinocchio_->model.lowerPositionLimit.head(hand_q_size_)); }
-std::vector<double> Model::upper_limits() const { return to_std(pinocchio_->model.upperPositionLimit.head(hand_q_size_)); }
+std::vector<double> Model::lower_limits() const {
+  return to_std(pinocchio_->model.lowerPositionLimit.head(hand_q_size_));
+}
+std::vector<double> Model::upper_limits() const {
+  return to_std(pinocchio_->model.upperPositionLimit.head(hand_q_size_));
+}
 std::vector<double> Model::neutral() const { return to_std(pinocchio::neutral(pinocchio_->model)); }
 
 void Model::integrate(const double* q, const double* v, double* out) const {

@@ -24,8 +24,8 @@ struct FrameInfo {
 
 /// Hand and object as one kinematic tree; q = [hand, object] in Pinocchio's conventions.
 ///
-/// Its source is the only file that includes Pinocchio. A model holds the results of its last `update`, so it must not
-/// be shared between threads.
+/// Its source is the only file that includes Pinocchio. A model holds the results of its last `update`, so it
+/// must not be shared between threads.
 class Model {
  public:
   /// `urdf` is the text of the hand's URDF; its root is the world. Throws Error when it cannot be read.
@@ -53,7 +53,8 @@ class Model {
   /// Placements of all joints, and with `jacobians` the columns below.
   void update(const double* q, bool jacobians);
   const Placement& placement(int joint) const { return placements_[joint]; }
-  /// Spatial velocity [linear at the world's origin, angular] of everything that tangent coordinate v carries.
+  /// Spatial velocity [linear at the world's origin, angular] of everything that tangent coordinate v
+  /// carries.
   const double* velocity(int v) const;
   /// Tangent coordinates that move a joint.
   const std::vector<int>& support(int joint) const { return supports_[joint]; }

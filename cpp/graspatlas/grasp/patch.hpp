@@ -5,14 +5,15 @@
 
 namespace graspatlas {
 
-/// A rigid placement: maps coordinates of the inner frame to the outer one, p_outer = rotation p_inner + translation.
+/// A rigid placement: maps coordinates of the inner frame to the outer one, p_outer = rotation p_inner +
+/// translation.
 struct Placement {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 };
 
-/// A patch at one (u, v): the point o, the outward unit normal m and two unit tangents a, b that are normal to m,
-/// each with its derivatives by u and v. Eqs (3) and (4) of the paper.
+/// A patch at one (u, v): the point o, the outward unit normal m and two unit tangents a, b that are normal
+/// to m, each with its derivatives by u and v. Eqs (3) and (4) of the paper.
 struct PatchPoint {
   Eigen::Vector3d o, m, a, b;
   Eigen::Vector3d o_u, m_u, a_u, b_u;
@@ -29,7 +30,8 @@ class Patch {
   virtual bool u_is_angle() const = 0;
 };
 
-/// o(u, v) = u e_x + v e_z + 0 e_y in the placement, with normal e_y. A fixed point is a plane with u and v frozen.
+/// o(u, v) = u e_x + v e_z + 0 e_y in the placement, with normal e_y. A fixed point is a plane with u and v
+/// frozen.
 class PlanePatch : public Patch {
  public:
   explicit PlanePatch(const Placement& placement);
@@ -40,10 +42,12 @@ class PlanePatch : public Patch {
   Placement placement_;
 };
 
-/// o(u, v) = (r(v) cos u, v, r(v) sin u) in the placement, with outward normal (cos u, -r', sin u) / sqrt(1 + r'^2).
+/// o(u, v) = (r(v) cos u, v, r(v) sin u) in the placement, with outward normal (cos u, -r', sin u) / sqrt(1 +
+/// r'^2).
 ///
-/// r is a piecewise cubic, r(v) = c0 + c1 s + c2 s^2 + c3 s^3 with s = v - break, so cylinders and cones are the cases of
-/// one constant or linear piece. It should have a continuous second derivative, for Newton's sake.
+/// r is a piecewise cubic, r(v) = c0 + c1 s + c2 s^2 + c3 s^3 with s = v - break, so cylinders and cones are
+/// the cases of one constant or linear piece. It should have a continuous second derivative, for Newton's
+/// sake.
 class RevolutionPatch : public Patch {
  public:
   /// `breaks` ascend, one more than there are rows of `coefficients` [pieces x 4].

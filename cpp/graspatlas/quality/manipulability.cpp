@@ -9,13 +9,13 @@ namespace graspatlas {
 
 namespace {
 
-// A singular value this far below the largest counts as zero: the rank of J, of G, of the constraint between them.
+// A singular value this far below the largest counts as zero: the rank of J, of G, of the constraint between
+// them.
 constexpr double kRankTolerance = 1e-9;
 
 }  // namespace
 
-Manipulability::Manipulability(GraspSystem& system, double length_unit)
-    : system_(system), length_unit_(length_unit) {
+Manipulability::Manipulability(GraspSystem& system, double length_unit) : system_(system), length_unit_(length_unit) {
   if (system.object_dof() == 0 || system.contact_count() == 0)
     throw Error("manipulability needs an object and at least one contact");
   if (!(length_unit > 0.0) || !std::isfinite(length_unit))
@@ -32,8 +32,8 @@ void Manipulability::semi_axes(const double* x, double* out) {
   J_ /= length_unit_;
   Gt_.rightCols(dof - lengths) /= length_unit_;
 
-  // J' P = Q [R1 R2; 0 0], so that J+ G' t = Q z with R1' z = (first rows of P' G') t, wherever R2' z agrees with the
-  // other rows: those t are the coordinated motions.
+  // J' P = Q [R1 R2; 0 0], so that J+ G' t = Q z with R1' z = (first rows of P' G') t, wherever R2' z agrees
+  // with the other rows: those t are the coordinated motions.
   Eigen::ColPivHouseholderQR<Matrix> qr(J_.transpose());
   qr.setThreshold(kRankTolerance);
   const Eigen::Index rank = qr.rank(), rows = J_.rows();
@@ -51,8 +51,8 @@ void Manipulability::semi_axes(const double* x, double* out) {
     if (constrained == dof) return;
     Z = (Z * svd.matrixV().rightCols(dof - constrained)).eval();
   }
-  // Q has orthonormal columns: the singular values of Z are those of J+ G' on the coordinated motions. R, the triangular
-  // factor of Z, has the same ones and is smaller.
+  // Q has orthonormal columns: the singular values of Z are those of J+ G' on the coordinated motions. R, the
+  // triangular factor of Z, has the same ones and is smaller.
   if (Z.rows() < Z.cols()) return;
   Eigen::HouseholderQR<Matrix> small(Z);
   const Eigen::Index axes = Z.cols();

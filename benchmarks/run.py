@@ -1,0 +1,84 @@
+"""Time the engine on one thread and print medians: ``make bench``.
+
+Figures depend on the machine; compare them as ratios within one run. Every row also prints what it found, so that a
+faster but wrong engine is seen at once.
+"""
+
+from __future__ import annotations
+
+import platform
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import graspatlas as ga
+
+REPEATS = 7
+
+
+def median_seconds(work: Callable[[], Any]) -> tuple[float, Any]:
+    """Median time of a call over several, after one that is not counted; and what it returned."""
+    result = work()
+    times = []
+    for _ in range(REPEATS):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return statistics.median(times), result
+
+
+def atlas_row(name: str, system: ga.systems.AnySystem, x0: Any, radius: float, epsilon: float) -> None:
+    """Time one atlas and print a row."""
+    seconds, atlas = median_seconds(lambda: ga.build_atlas(system, x0, radius=radius, epsilon=epsilon, progress=False))
+    rate = atlas.n_charts / seconds
+    print(f"{name:32} {atlas.n_charts:7d} charts {1e3 * seconds:9.1f} ms {rate:9.0f} charts/s   {atlas.status}")
+
+
+def grasp_rows(name: str, dimension: int, radius: float) -> None:
+    """Time the atlas of a bundled problem and the manipulability of its charts."""
+    problem = ga.load_problem(name)
+    system = problem.system(dimension)
+    atlas_row(f"{name} k={dimension} r={radius:g}", system, problem.x1_array, radius, 0.5)
+    atlas = ga.build_atlas(system, problem.x1_array, radius=radius, epsilon=0.5, progress=False)
+    seconds, values = median_seconds(
+        lambda: ga.quality.evaluate("manipulability_volume", ga.Grasps(problem, atlas.centers, system))
+    )
+    print(
+        f"{'  manipulability':32} {len(values):7d} grasps {1e3 * seconds:9.1f} ms {1e6 * seconds / len(values):9.2f} us each"
+    )
+
+
+def projection_row() -> None:
+    """Time single projections of the can onto its manifold, from a chart's radius away."""
+    problem = ga.load_problem("schunk_can")
+    atlas = ga.build_atlas(problem.system(2), problem.x1_array, radius=0.17, epsilon=0.5, progress=False)
+    directions = np.random.default_rng(0).normal(size=(atlas.n_charts, 2))
+    steps = 0.17 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    seconds, _ = median_seconds(lambda: [atlas.point(i, u) for i, u in enumerate(steps)])
+    print(
+        f"{'can: one projection, from Python':32} {atlas.n_charts:7d} points {1e3 * seconds:9.1f} ms "
+        f"{1e6 * seconds / atlas.n_charts:9.2f} us each"
+    )
+
+
+def main() -> None:
+    """Print all rows."""
+    print(
+        f"graspatlas {ga.__version__}, Python {platform.python_version()}, {platform.machine()}; "
+        f"medians of {REPEATS} runs, one thread"
+    )
+    atlas_row("sphere r=0.1", ga.systems.Sphere(3), [1.0, 0.0, 0.0], 0.1, 0.1)
+    atlas_row("torus r=0.1", ga.systems.Torus(0.8, 0.5), [1.3, 0.0, 0.0], 0.1, 0.1)
+    atlas_row("3-sphere r=0.2", ga.systems.Sphere(4), [1.0, 0.0, 0.0, 0.0], 0.2, 0.1)
+    atlas_row("4-sphere r=0.4", ga.systems.Sphere(5), [1.0, 0.0, 0.0, 0.0, 0.0], 0.4, 0.3)
+    grasp_rows("schunk_can", 2, 0.17)
+    grasp_rows("schunk_oil_bottle", 2, 0.04)
+    grasp_rows("schunk_oil_bottle", 3, 0.1)
+    projection_row()
+
+
+if __name__ == "__main__":
+    main()

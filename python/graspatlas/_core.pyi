@@ -1,0 +1,435 @@
+"""
+Compiled core of graspatlas: continuation, grasp systems and quality indices.
+"""
+
+from __future__ import annotations
+import collections.abc
+import numpy
+import numpy.typing
+import typing
+
+__all__: list[str] = [
+    "Angles",
+    "AnySystem",
+    "AtlasBuilder",
+    "ContactSide",
+    "GraspAtlasError",
+    "GraspSystem",
+    "JointInfo",
+    "Model",
+    "Neighbours",
+    "Patch",
+    "PatchParameter",
+    "PlanePatch",
+    "Polytope",
+    "PythonSystem",
+    "RevolutionPatch",
+    "Rotations",
+    "Sphere",
+    "Torus",
+    "project",
+    "semi_axes",
+]
+
+class GraspAtlasError(ValueError):
+    pass
+
+class AnySystem:
+    """
+    Equations R(x) = 0 on a configuration space.
+    """
+    def difference(
+        self,
+        x0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        x1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        x1 (-) x0 [tangent_size].
+        """
+    def embed(self, x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Euclidean image of x, by which charts are looked up.
+        """
+    def evaluate_jacobian(
+        self, x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        J(x) [n_equations x tangent_size], derivative of R(x (+) v) at v = 0.
+        """
+    def evaluate_residual(
+        self, x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        R(x) [n_equations].
+        """
+    def integrate(
+        self,
+        x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        x (+) v [configuration_size].
+        """
+    def slack(self, x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Distance of x from each bound; negative outside.
+        """
+    @property
+    def bound_normals(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        B [n_bounds x tangent_size]: slack(x (+) v) = slack(x) - B v to first order.
+        """
+    @property
+    def configuration_size(self) -> int:
+        """
+        Numbers in a point x.
+        """
+    @property
+    def dimension(self) -> int:
+        """
+        k: tangent_size - n_equations.
+        """
+    @property
+    def n_equations(self) -> int:
+        """
+        Numbers in R(x).
+        """
+    @property
+    def tangent_size(self) -> int:
+        """
+        Numbers in a tangent vector v.
+        """
+
+class PythonSystem(AnySystem):
+    """
+    Base of systems written in Python.
+    """
+    def __init__(
+        self,
+        n_variables: typing.SupportsInt | typing.SupportsIndex,
+        n_equations: typing.SupportsInt | typing.SupportsIndex,
+        lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> None: ...
+
+class Sphere(AnySystem):
+    """
+    The unit sphere in R^n.
+    """
+    def __init__(self, n: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+
+class Torus(AnySystem):
+    """
+    A torus in R^3.
+    """
+    def __init__(
+        self,
+        major_radius: typing.SupportsFloat | typing.SupportsIndex,
+        minor_radius: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+
+class Angles(AnySystem):
+    """
+    n angles, no equation.
+    """
+    def __init__(self, n: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+
+class Rotations(AnySystem):
+    """
+    All rotations, no equation.
+    """
+    def __init__(self) -> None: ...
+
+class Polytope:
+    """
+    A convex polytope in R^k: a box, cut by half-spaces.
+    """
+    def __init__(
+        self,
+        dimension: typing.SupportsInt | typing.SupportsIndex,
+        half_width: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+    def contains(
+        self,
+        u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0,
+    ) -> bool:
+        """
+        True when u is inside all half-spaces.
+        """
+    def cut(
+        self,
+        normal: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        offset: typing.SupportsFloat | typing.SupportsIndex,
+        tag: typing.SupportsInt | typing.SupportsIndex,
+    ) -> bool:
+        """
+        Keep normal . u <= offset; False if nothing is cut off.
+        """
+    @property
+    def vertices(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Vertices [n x k].
+        """
+
+class Neighbours:
+    """
+    Points that come one by one, and those within a distance of any point.
+    """
+    def __init__(self, size: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def insert(
+        self,
+        point: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        size: typing.SupportsInt | typing.SupportsIndex,
+    ) -> None:
+        """
+        Add a point [size].
+        """
+    def within(
+        self,
+        point: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        distance: typing.SupportsFloat | typing.SupportsIndex,
+        size: typing.SupportsInt | typing.SupportsIndex,
+    ) -> list[int]:
+        """
+        Numbers of the points within a distance, ascending.
+        """
+
+class AtlasBuilder:
+    """
+    Grows an atlas chart by chart (Algorithm 1, lines 4 to 13).
+    """
+    def __init__(
+        self,
+        system: AnySystem,
+        x0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        radius: typing.SupportsFloat | typing.SupportsIndex,
+        epsilon: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+    def arrays(self) -> dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]]:
+        """
+        The atlas as a dictionary of arrays.
+        """
+    def expand(
+        self,
+        chart_limit: typing.SupportsInt | typing.SupportsIndex,
+        seconds: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None:
+        """
+        Expand until complete, the limit of charts is reached, or the seconds have passed.
+        """
+    @property
+    def complete(self) -> bool:
+        """
+        True when no chart is left to expand.
+        """
+    @property
+    def n_charts(self) -> int:
+        """
+        Charts so far.
+        """
+    @property
+    def n_open(self) -> int:
+        """
+        Charts still to be expanded.
+        """
+    @property
+    def n_projections(self) -> int:
+        """
+        Newton projections so far.
+        """
+
+class JointInfo:
+    """
+    A joint's name and its places in q and v.
+    """
+    @property
+    def name(self) -> str: ...
+    @property
+    def q_index(self) -> int: ...
+    @property
+    def q_size(self) -> int: ...
+    @property
+    def v_index(self) -> int: ...
+    @property
+    def v_size(self) -> int: ...
+
+class Model:
+    """
+    Hand and object as one kinematic tree.
+    """
+    def __init__(self, urdf: str, object_joint: str) -> None: ...
+    def frame_placements(
+        self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> dict[str, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]]:
+        """
+        Frame name -> T_world_frame [4 x 4] at q.
+        """
+    @property
+    def frames(self) -> dict[str, tuple[int, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]]]:
+        """
+        Frame name -> (joint, placement of the frame in the joint [4 x 4]).
+        """
+    @property
+    def hand_joints(self) -> list[JointInfo]:
+        """
+        Moving joints of the hand, in the order of q.
+        """
+    @property
+    def hand_q_size(self) -> int:
+        """
+        Numbers in the hand's part of q.
+        """
+    @property
+    def hand_v_size(self) -> int:
+        """
+        Numbers in the hand's part of a velocity.
+        """
+    @property
+    def lower_limits(self) -> list[float]:
+        """
+        Lower joint limits [hand_q_size].
+        """
+    @property
+    def neutral(self) -> list[float]:
+        """
+        Neutral configuration [q_size].
+        """
+    @property
+    def object_joint(self) -> int:
+        """
+        Joint that carries the object; -1 without one.
+        """
+    @property
+    def q_size(self) -> int:
+        """
+        Numbers in q.
+        """
+    @property
+    def upper_limits(self) -> list[float]:
+        """
+        Upper joint limits [hand_q_size].
+        """
+    @property
+    def v_size(self) -> int:
+        """
+        Numbers in a velocity.
+        """
+
+class Patch:
+    """
+    A parametrised piece of surface.
+    """
+    def evaluate(
+        self, u: typing.SupportsFloat | typing.SupportsIndex, v: typing.SupportsFloat | typing.SupportsIndex
+    ) -> dict[str, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]]:
+        """
+        Point o, normal m, tangents a and b, and their derivatives by u and v.
+        """
+    @property
+    def u_is_angle(self) -> bool:
+        """
+        True when u is an angle, False when it is a length.
+        """
+
+class PlanePatch(Patch):
+    """
+    The x-z plane of a placement, normal y.
+    """
+    def __init__(self, T: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None: ...
+
+class RevolutionPatch(Patch):
+    """
+    A surface of revolution about y of a placement.
+    """
+    def __init__(
+        self,
+        T: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
+        breaks: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+        coefficients: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 4]"],
+    ) -> None: ...
+
+class PatchParameter:
+    """
+    One parameter of a patch: frozen, or an unknown.
+    """
+    def __init__(
+        self,
+        free: bool,
+        value: typing.SupportsFloat | typing.SupportsIndex,
+        periodic: bool,
+        lower: typing.SupportsFloat | typing.SupportsIndex,
+        upper: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+
+class ContactSide:
+    """
+    A patch on a joint of the model.
+    """
+    def __init__(
+        self,
+        joint: typing.SupportsInt | typing.SupportsIndex,
+        T_joint_frame: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
+        patch: Patch,
+        u: PatchParameter,
+        v: PatchParameter,
+    ) -> None: ...
+
+class GraspSystem(AnySystem):
+    """
+    The relevant grasps R of a hand and an object.
+    """
+    def __init__(
+        self,
+        model: Model,
+        contacts: collections.abc.Sequence[tuple[ContactSide, ContactSide]],
+        motions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        length_scale: typing.SupportsFloat | typing.SupportsIndex,
+        lower: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+        upper: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+    ) -> None: ...
+    def grasp_arrays(
+        self, X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]]:
+        """
+        For grasps X [n x configuration_size]: T_palm_object, contact points and normals, J and G, as arrays.
+        """
+    @property
+    def bound_names(self) -> list[str]:
+        """
+        Name of each bound, in the order of slack.
+        """
+    @property
+    def n_contacts(self) -> int:
+        """
+        Number of contacts.
+        """
+    @property
+    def n_parameters(self) -> int:
+        """
+        Free patch parameters.
+        """
+    @property
+    def object_dof(self) -> int:
+        """
+        Degrees of freedom of the object.
+        """
+
+def project(
+    system: AnySystem,
+    x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    Phi: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> typing.Any:
+    """
+    Point of the manifold above u in the tangent space at x (eqs 14 and 15); None when Newton does not converge.
+    """
+
+def semi_axes(
+    system: GraspSystem,
+    X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    length_unit: typing.SupportsFloat | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Ascending semi-axes of the manipulability ellipsoid of each grasp [n x object_dof]; see manipulability.hpp.
+    """
