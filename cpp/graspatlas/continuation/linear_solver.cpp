@@ -46,18 +46,56 @@ bool LinearSolver::factorize() {
   return true;
 }
 
+namespace {
+
+// Dot product in four running sums, which the processor adds up side by side.
+inline double dot(const double* __restrict a, const double* __restrict b, int n) {
+  double s0 = 0.0, s1 = 0.0, s2 = 0.0, s3 = 0.0;
+  int i = 0;
+  for (; i + 4 <= n; i += 4) {
+    s0 += a[i] * b[i];
+    s1 += a[i + 1] * b[i + 1];
+    s2 += a[i + 2] * b[i + 2];
+    s3 += a[i + 3] * b[i + 3];
+  }
+  for (; i < n; ++i) s0 += a[i] * b[i];
+  return (s0 + s1) + (s2 + s3);
+}
+
+}  // namespace
+
 void LinearSolver::solve(double* b) const {
   const int n = size_;
+  permuted_.resize(n);
   double* y = permuted_.data();
+  for (int i = 0; i < n; ++i) y[i] = b[origin_[i]] - dot(rows_[i], y, i);
+  for (int i = n - 1; i >= 0; --i) b[i] = (y[i] - dot(rows_[i] + i + 1, b + i + 1, n - i - 1)) / rows_[i][i];
+}
+
+void LinearSolver::solve(double* B, int columns) const {
+  const int n = size_;
+  permuted_.resize(static_cast<std::size_t>(n) * columns);
+  double* Y = permuted_.data();
   for (int i = 0; i < n; ++i) {
-    double sum = b[origin_[i]];
-    for (int j = 0; j < i; ++j) sum -= rows_[i][j] * y[j];
-    y[i] = sum;
+    double* __restrict y = Y + static_cast<std::ptrdiff_t>(i) * columns;
+    std::copy_n(B + static_cast<std::ptrdiff_t>(origin_[i]) * columns, columns, y);
+    for (int j = 0; j < i; ++j) {
+      const double factor = rows_[i][j];
+      const double* __restrict above = Y + static_cast<std::ptrdiff_t>(j) * columns;
+      for (int c = 0; c < columns; ++c) y[c] -= factor * above[c];
+    }
   }
   for (int i = n - 1; i >= 0; --i) {
-    double sum = y[i];
-    for (int j = i + 1; j < n; ++j) sum -= rows_[i][j] * b[j];
-    b[i] = sum / rows_[i][i];
+    const double* y = Y + static_cast<std::ptrdiff_t>(i) * columns;
+    double* __restrict b = B + static_cast<std::ptrdiff_t>(i) * columns;
+    std::copy_n(y, columns, b);
+    for (int j = i + 1; j < n; ++j) {
+      const double factor = rows_[i][j];
+      const double* __restrict below = B + static_cast<std::ptrdiff_t>(j) * columns;
+      for (int c = 0; c < columns; ++c) b[c] -= factor * below[c];
+    }
+    const double inverse = 1.0 / rows_[i][i];
+    for (int c = 0; c < columns; ++c) b[c] *= inverse;
   }
 }
 

@@ -21,6 +21,9 @@ class LinearSolver {
   /// Solve A y = b in place with the last factorisation.
   void solve(double* b) const;
 
+  /// Solve A Y = B in place for `columns` right-hand sides; B is row-major [size x columns].
+  void solve(double* B, int columns) const;
+
  private:
   int size_, stride_;
   std::vector<double> storage_;

@@ -13,6 +13,8 @@ namespace {
 constexpr double kNearlyZero = 1e-6;
 // A Jacobian whose smallest singular value is this far below its largest has lost rank.
 constexpr double kRankTolerance = 1e-9;
+// A tangent vector whose squared length is below this beside the ones before it depends on them.
+constexpr double kDependent = 1e-20;
 
 double largest_entry(const std::vector<double>& R) {
   double largest = 0.0;
@@ -23,6 +25,26 @@ double largest_entry(const std::vector<double>& R) {
   return largest;
 }
 
+// Gram-Schmidt on the rows, twice for orthogonality to working precision; false when they are dependent.
+bool orthonormalize(double* rows, int count, int n) {
+  for (int i = 0; i < count; ++i) {
+    double* row = rows + static_cast<std::ptrdiff_t>(i) * n;
+    for (int pass = 0; pass < 2; ++pass)
+      for (int j = 0; j < i; ++j) {
+        const double* other = rows + static_cast<std::ptrdiff_t>(j) * n;
+        double dot = 0.0;
+        for (int c = 0; c < n; ++c) dot += row[c] * other[c];
+        for (int c = 0; c < n; ++c) row[c] -= dot * other[c];
+      }
+    double squared = 0.0;
+    for (int c = 0; c < n; ++c) squared += row[c] * row[c];
+    if (!(squared > kDependent) || !std::isfinite(squared)) return false;
+    const double inverse = 1.0 / std::sqrt(squared);
+    for (int c = 0; c < n; ++c) row[c] *= inverse;
+  }
+  return true;
+}
+
 }  // namespace
 
 Newton::Newton(System& system, NewtonOptions options)
@@ -31,7 +53,9 @@ Newton::Newton(System& system, NewtonOptions options)
       solver_(system.tangent_size()),
       R_(system.equation_count()),
       J_(static_cast<std::size_t>(system.equation_count()) * system.tangent_size()),
-      step_(system.tangent_size()) {}
+      step_(system.tangent_size()),
+      tangents_(static_cast<std::size_t>(system.tangent_size()) * system.dimension()),
+      corrections_(tangents_.size()) {}
 
 bool Newton::factorize(const double* Phi) {
   const int n = system_.tangent_size(), equations = system_.equation_count();
@@ -67,37 +91,23 @@ Projection Newton::project(double* x, const double* Phi) {
 
 bool Newton::tangent_basis(double* Phi) {
   const int n = system_.tangent_size(), k = system_.dimension(), equations = system_.equation_count();
-  for (int i = 0; i < k; ++i) {
-    double* row = Phi + static_cast<std::size_t>(i) * n;
-    std::fill_n(row, n, 0.0);
-    row[equations + i] = 1.0;
-    solver_.solve(row);
-    // The factorisation may be that of a point nearby: one step of iterative refinement with the Jacobian
-    // here.
-    for (int e = 0; e < equations; ++e) {
-      const double* gradient = &J_[static_cast<std::size_t>(e) * n];
-      double dot = 0.0;
-      for (int c = 0; c < n; ++c) dot += gradient[c] * row[c];
-      step_[e] = dot;
+  // Columns of T solve [J; Phi'] T = [0; I]. The factorisation may be that of a point nearby, so one step of iterative
+  // refinement follows with the Jacobian here.
+  double* T = tangents_.data();
+  double* correction = corrections_.data();
+  std::fill(tangents_.begin(), tangents_.end(), 0.0);
+  for (int i = 0; i < k; ++i) T[(equations + i) * k + i] = 1.0;
+  solver_.solve(T, k);
+  std::fill(corrections_.begin(), corrections_.end(), 0.0);
+  for (int e = 0; e < equations; ++e)
+    for (int c = 0; c < n; ++c) {
+      const double slope = J_[static_cast<std::size_t>(e) * n + c];
+      for (int i = 0; i < k; ++i) correction[e * k + i] += slope * T[c * k + i];
     }
-    std::fill(step_.begin() + equations, step_.end(), 0.0);
-    solver_.solve(step_.data());
-    for (int c = 0; c < n; ++c) row[c] -= step_[c];
-    // Gram-Schmidt, twice for orthogonality to working precision.
-    for (int pass = 0; pass < 2; ++pass)
-      for (int j = 0; j < i; ++j) {
-        const double* other = Phi + static_cast<std::size_t>(j) * n;
-        double dot = 0.0;
-        for (int c = 0; c < n; ++c) dot += row[c] * other[c];
-        for (int c = 0; c < n; ++c) row[c] -= dot * other[c];
-      }
-    double squared = 0.0;
-    for (int c = 0; c < n; ++c) squared += row[c] * row[c];
-    if (!(squared > 1e-20) || !std::isfinite(squared)) return false;
-    const double inverse = 1.0 / std::sqrt(squared);
-    for (int c = 0; c < n; ++c) row[c] *= inverse;
-  }
-  return true;
+  solver_.solve(correction, k);
+  for (int i = 0; i < k; ++i)
+    for (int c = 0; c < n; ++c) Phi[i * n + c] = T[c * k + i] - correction[c * k + i];
+  return orthonormalize(Phi, k, n);
 }
 
 Projection Newton::project_freely(double* x, double* Phi) {

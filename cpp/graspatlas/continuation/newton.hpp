@@ -43,7 +43,7 @@ class Newton {
   System& system_;
   NewtonOptions options_;
   LinearSolver solver_;
-  std::vector<double> R_, J_, step_;
+  std::vector<double> R_, J_, step_, tangents_, corrections_;
   double residual_ = 0.0;
 };
 

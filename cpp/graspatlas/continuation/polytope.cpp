@@ -31,10 +31,14 @@ bool share_edge(const std::uint16_t* a, const std::uint16_t* b, int k, std::uint
   return count == k - 1;
 }
 
-// True when at least `count` bits are set.
-inline bool at_least(std::uint64_t bits, int count) {
-  for (; count > 1 && bits; --count) bits &= bits - 1;
-  return bits != 0 || count <= 0;
+// The same from the bits of the facets that both vertices have.
+inline bool share_edge(std::uint64_t common, int k, std::uint16_t* shared) {
+  for (int i = 0; i < k - 1; ++i) {
+    if (common == 0) return false;
+    shared[i] = static_cast<std::uint16_t>(__builtin_ctzll(common));
+    common &= common - 1;
+  }
+  return true;
 }
 
 // Scratch of `cut`, one for each thread: no allocation once it has grown.
@@ -92,6 +96,7 @@ bool Polytope::cut(const double* normal, double offset, int tag) {
   scratch.signed_distance.resize(count);
   scratch.shared_facets.resize(k_);
   double* signed_distance = scratch.signed_distance.data();
+  std::uint16_t* shared = scratch.shared_facets.data();
   const double limit = offset + kOnPlane * (offset + 1.0);
   int outside_count = 0;
   for (int i = 0; i < count; ++i) {
@@ -109,10 +114,11 @@ bool Polytope::cut(const double* normal, double offset, int tag) {
   const bool masks_hold = facet_slots() <= kMaskBits;
   for (const int out : scratch.outside)
     for (const int in : scratch.inside) {
-      if (masks_hold && !at_least(masks_[in] & masks_[out], k_ - 1)) continue;
-      if (!share_edge(facets_at(in), facets_at(out), k_, scratch.shared_facets.data())) continue;
+      const bool edge = masks_hold ? share_edge(masks_[in] & masks_[out], k_, shared)
+                                   : share_edge(facets_at(in), facets_at(out), k_, shared);
+      if (!edge) continue;
       const double fraction = signed_distance[in] / (signed_distance[in] - signed_distance[out]);
-      add_vertex_on_edge(in, out, fraction, scratch.shared_facets.data(), facet);
+      add_vertex_on_edge(in, out, fraction, shared, facet);
     }
   for (const int out : scratch.outside)
     for (int c = 0; c < k_; ++c) --uses_[facets_at(out)[c]];
