@@ -90,7 +90,8 @@ void bind_model(py::module_& module) {
       .def_readonly("q_index", &JointInfo::q_index)
       .def_readonly("q_size", &JointInfo::q_size)
       .def_readonly("v_index", &JointInfo::v_index)
-      .def_readonly("v_size", &JointInfo::v_size);
+      .def_readonly("v_size", &JointInfo::v_size)
+      .def_readonly("prismatic", &JointInfo::prismatic);
   py::class_<Model, py::smart_holder>(module, "Model", "Hand and object as one kinematic tree.")
       .def(py::init([](const std::string& urdf, const std::string& object) {
              return std::make_unique<Model>(urdf, object_joint_from(object));

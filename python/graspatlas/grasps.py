@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
 from graspatlas import _core
 
@@ -32,8 +33,8 @@ class Grasp:
         contact_points: Contact points in the palm's frame [m, 3], metres.
         contact_normals: Outward unit normals of the object there [m, 3].
         J: Joint velocities to velocities of the contact points [3 m, h].
-        G: Contact forces to the object's wrench at its origin, world axes [6, 3 m].
-        semi_axes: Ascending semi-axes of the manipulability ellipsoid [6], lengths in millimetres.
+        G: Contact forces to the object's wrench at its origin, world axes [6, 3 m]; [3, 3 m] in the plane.
+        semi_axes: Ascending semi-axes of the manipulability ellipsoid [6], lengths in millimetres; [3] in the plane.
         quality: Value of the index that was optimised; NaN when there is none.
         chart: Index of the chart; -1 when there is none.
     """
@@ -58,8 +59,7 @@ class Grasp:
     @property
     def object_quat_xyzw(self) -> Array:
         """Rotation of the object as a unit quaternion [4]."""
-        start = len(self.q) + 3
-        return np.asarray(self.x[start : start + 4])
+        return np.asarray(Rotation.from_matrix(self.T_palm_object[:3, :3]).as_quat())
 
     def __str__(self) -> str:
         angles = ", ".join(f"{name} {value:.3f}" for name, value in zip(self.joints, self.q, strict=False))

@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 #: How far a first grasp may miss a contact, since it is projected onto the contacts anyway [m], [rad].
 CONTACT_TOLERANCE = 1e-3
 NORMAL_TOLERANCE = 0.05
+#: Ways in which the object can move.
+OBJECT_JOINTS = ("free_flyer", "planar")
 #: How far a first grasp may break a joint limit or leave a patch [rad or m].
 LIMIT_TOLERANCE = 1e-9
 
@@ -117,6 +119,7 @@ class Problem:
         contacts: The contacts, at least one.
         x1: A feasible first grasp.
         motions: Principal hand motions; without them only the full dimension t can be traced.
+        object_joint: How the object moves: ``"free_flyer"``, or ``"planar"`` for problems in the palm's x-y plane.
         length_scale: Length that counts as much as one radian [m].
         defaults: ``dimension``, ``radius``, ``epsilon`` and ``quality`` to use when the caller names none.
         description, source: For people.
@@ -131,6 +134,7 @@ class Problem:
     contacts: tuple[Contact, ...]
     x1: FirstGrasp
     motions: HandMotions | None = None
+    object_joint: str = "free_flyer"
     length_scale: float = 0.01
     defaults: Mapping[str, Any] = field(default_factory=dict)
     description: str = ""
@@ -142,7 +146,10 @@ class Problem:
             raise GraspAtlasError(f"problem '{self.name}' has no contact")
         if not (np.isfinite(self.length_scale) and self.length_scale > 0.0):
             raise GraspAtlasError(f"length_scale must be positive, got {self.length_scale}")
+        if self.object_joint not in OBJECT_JOINTS:
+            raise unknown_name("object joint", self.object_joint, OBJECT_JOINTS)
         self._check_joints()
+        self._check_plane()
         for contact in self.contacts:
             self.hand.frame(contact.frame)
         self._check_x1()
@@ -159,6 +166,11 @@ class Problem:
             raise GraspAtlasError(
                 f"the hand motions and hand '{self.hand.name}' do not have the same joints: see '{odd}'"
             )
+
+    def _check_plane(self) -> None:
+        x, y, z, _ = self.x1.object_quat_xyzw
+        if self.object_joint == "planar" and max(abs(self.x1.object_xyz[2]), abs(x), abs(y)) > 1e-9:
+            raise GraspAtlasError("in a planar problem x1's object lies in the x-y plane: z = 0, and turned about z only")
 
     def _check_x1(self) -> None:
         arrays = self.full_system.grasp_arrays(self.x1_array[None])
@@ -189,6 +201,15 @@ class Problem:
     def full_system(self) -> _core.GraspSystem:
         """The system F of all feasible grasps, no hand motion frozen: eq (9)."""
         return self._system(np.eye(self.hand.model.hand_v_size))
+
+    @cached_property
+    def _joint_units(self) -> Array:
+        """Joint velocity that counts as one [nv]: a radian, or length_scale for prismatic joints."""
+        units = np.ones(self.hand.model.hand_v_size)
+        for joint in self.hand.model.hand_joints:
+            if joint.prismatic:
+                units[joint.v_index] = self.length_scale
+        return units
 
     @cached_property
     def full_dimension(self) -> int:
@@ -228,7 +249,11 @@ class Problem:
         return self._system(self.motions.reordered(self.hand.joints).kept(s))
 
     def _system(self, motions: Array) -> _core.GraspSystem:
-        model = _core.Model(self.hand.urdf, "free_flyer")
+        """The system that keeps these hand motions, columns of joint velocities [nv, p]."""
+        model = _core.Model(self.hand.urdf, self.object_joint)
+        if (self._joint_units != 1.0).any():
+            orthonormal, R = np.linalg.qr(motions / self._joint_units[:, None])
+            motions = self._joint_units[:, None] * orthonormal * np.sign(np.diag(R))
         sides = []
         for contact, parameters in zip(self.contacts, self._x1_parameters, strict=True):
             joint, T = self.hand.frame(contact.frame)
@@ -308,7 +333,10 @@ class Problem:
 
     @cached_property
     def x1_array(self) -> Array:
-        """x1 as the vector [q_hand, object position, object quaternion (x, y, z, w), free patch parameters]."""
+        """x1 as the vector [q_hand, q_object, free patch parameters], in Pinocchio's conventions.
+
+        q_object is position and quaternion (x, y, z, w) of a free flyer, and (x, y, cos, sin) in the plane.
+        """
         free = []
         for contact, (hand, body) in zip(self.contacts, self._x1_parameters, strict=True):
             for patch, frozen, values in (
@@ -316,7 +344,12 @@ class Problem:
                 (contact.object, contact.frozen, body),
             ):
                 free += [values["uv".index(name)] for name in patch.parameters if name not in frozen]
-        return np.array([*self._q_hand, *self.x1.object_xyz, *self.x1.object_quat_xyzw, *free])
+        if self.object_joint == "planar":
+            _, _, z, w = self.x1.object_quat_xyzw
+            pose = [*self.x1.object_xyz[:2], w * w - z * z, 2.0 * w * z]
+        else:
+            pose = [*self.x1.object_xyz, *self.x1.object_quat_xyzw]
+        return np.array([*self._q_hand, *pose, *free])
 
     def frozen_residual(self, X: ArrayLike, dimension: int) -> Array:
         """Eq (13), E_s' (q_hand - q_hand,1), at grasps X [n, size of x]: [n, s], zero on R."""
@@ -327,7 +360,7 @@ class Problem:
         E_s = self.motions.reordered(self.hand.joints).frozen(s)
         difference = self.full_system.difference
         nv = self.hand.model.hand_v_size
-        return np.array([difference(self.x1_array, x)[:nv] @ E_s for x in rows])
+        return np.array([(self._joint_units * difference(self.x1_array, x)[:nv]) @ E_s for x in rows])
 
     def to_dict(self) -> dict[str, Any]:
         """The problem as plain data that :meth:`from_dict` reads, with the text of its URDFs."""
@@ -339,7 +372,7 @@ class Problem:
                 **_body_dict(self.hand),
                 "limits": {k: list(v) for k, v in self.hand.limits.items()},
             },
-            "object": _body_dict(self.object),
+            "object": {**_body_dict(self.object), "joint": self.object_joint},
             "length_scale": self.length_scale,
             "contacts": [contact.to_dict() for contact in self.contacts],
             "hand_motions": self.motions.to_dict() if self.motions else None,
@@ -397,6 +430,7 @@ class Problem:
             name=str(data["name"]),
             hand=Hand(**_body_arguments(hand_data, folder), limits=limits),
             object=Body(**_body_arguments(data["object"], folder)),
+            object_joint=str(data["object"].get("joint", "free_flyer")),
             contacts=contacts,
             x1=x1,
             motions=HandMotions.from_dict(motions) if motions else None,

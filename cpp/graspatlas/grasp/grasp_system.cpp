@@ -1,5 +1,6 @@
 #include "graspatlas/grasp/grasp_system.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -10,7 +11,15 @@ namespace graspatlas {
 
 namespace {
 
-constexpr int kEquations = 5;  // of one contact
+// Entries of one contact: the three coordinates between the points, and the hand's two tangents on the object's normal.
+// In the plane the z coordinate and the tangent along z vanish.
+constexpr int kEntries = 5;
+constexpr int kSpatialRows[] = {0, 1, 2, 3, 4};
+constexpr int kPlanarRows[] = {0, 1, 3};
+
+bool is_planar(const Model& model) { return model.object_kind() == ObjectJoint::planar; }
+
+int equations_per_contact(const Model& model) { return is_planar(model) ? 3 : 5; }
 
 int object_v_size(const Model& model) { return model.v_size() - model.hand_v_size(); }
 
@@ -60,14 +69,17 @@ GraspSystem::GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> cont
                          double length_scale, const std::vector<double>& lower, const std::vector<double>& upper)
     : System(model->q_size() + count_free(contacts),
              static_cast<int>(motions.cols()) + graspatlas::object_v_size(*model) + count_free(contacts),
-             kEquations * static_cast<int>(contacts.size()),
+             equations_per_contact(*model) * static_cast<int>(contacts.size()),
              embedding_size(*model, contacts, static_cast<int>(motions.cols()))),
       model_(std::move(model)),
       contacts_(std::move(contacts)),
       motions_(motions),
+      coordinates_((motions.transpose() * motions).ldlt().solve(motions.transpose()).transpose()),
       all_motions_(motions.rows() == motions.cols() && motions.isIdentity(0.0)),
       motion_count_(static_cast<int>(motions.cols())),
       object_v_size_(graspatlas::object_v_size(*model_)),
+      rows_per_contact_(equations_per_contact(*model_)),
+      rows_(is_planar(*model_) ? kPlanarRows : kSpatialRows),
       length_scale_(length_scale),
       velocity_(model_->v_size()) {
   if (motions.rows() != model_->hand_v_size())
@@ -145,14 +157,22 @@ void GraspSystem::place_side(const ContactSide& side, const double*& w, SideStat
   out.point.noalias() = joint.rotation * in_joint + joint.translation;
 }
 
-void GraspSystem::contact_residual(const SideState& hand, const SideState& object, double* R) const {
+void GraspSystem::contact_entries(const SideState& hand, const SideState& object, double* entries) const {
   const Eigen::Vector3d gap = (hand.point - object.point) / length_scale_;
   const Eigen::Vector3d m = object.rotation * object.local.m;
-  R[0] = gap.x();
-  R[1] = gap.y();
-  R[2] = gap.z();
-  R[3] = m.dot(hand.rotation * hand.local.a);
-  R[4] = m.dot(hand.rotation * hand.local.b);
+  entries[0] = gap.x();
+  entries[1] = gap.y();
+  entries[2] = gap.z();
+  entries[3] = m.dot(first_tangent(hand, hand.local.a, hand.local.m));
+  entries[4] = m.dot(hand.rotation * hand.local.b);
+}
+
+// The hand's first tangent in the world, or its derivative, from those of a and of the normal: in the plane it is the
+// one in the plane.
+Eigen::Vector3d GraspSystem::first_tangent(const SideState& hand, const Eigen::Vector3d& a,
+                                           const Eigen::Vector3d& normal) const {
+  if (!is_planar(*model_)) return hand.rotation * a;
+  return Eigen::Vector3d::UnitZ().cross(hand.rotation * normal);
 }
 
 void GraspSystem::residual(const double* x, double* R) {
@@ -162,8 +182,9 @@ void GraspSystem::residual(const double* x, double* R) {
   for (const Contact& contact : contacts_) {
     place_side(contact.hand, w, hand);
     place_side(contact.object, w, object);
-    contact_residual(hand, object, R);
-    R += kEquations;
+    double entries[kEntries];
+    contact_entries(hand, object, entries);
+    for (int e = 0; e < rows_per_contact_; ++e) *R++ = entries[rows_[e]];
   }
 }
 
@@ -173,21 +194,23 @@ void GraspSystem::add_column(int v, double sign, const Eigen::Vector3d& point, c
   const double* velocity = model_->velocity(v);
   const Eigen::Map<const Eigen::Vector3d> linear(velocity), angular(velocity + 3);
   const Eigen::Vector3d moved = (sign / length_scale_) * (linear + angular.cross(point));
-  const double entries[kEquations] = {moved.x(), moved.y(), moved.z(), sign * angular.dot(a_cross_m),
-                                      sign * angular.dot(b_cross_m)};
+  const double entries[kEntries] = {moved.x(), moved.y(), moved.z(), sign * angular.dot(a_cross_m),
+                                    sign * angular.dot(b_cross_m)};
   const int n = tangent_size(), hand_v_size = model_->hand_v_size();
   if (v < hand_v_size && !all_motions_) {
     const double* motion = motions_.data() + static_cast<std::ptrdiff_t>(v) * motion_count_;
-    for (int e = 0; e < kEquations; ++e) {
+    for (int e = 0; e < rows_per_contact_; ++e) {
       double* __restrict row = J + static_cast<std::ptrdiff_t>(e) * n;
-      for (int c = 0; c < motion_count_; ++c) row[c] += entries[e] * motion[c];
+      const double entry = entries[rows_[e]];
+      for (int c = 0; c < motion_count_; ++c) row[c] += entry * motion[c];
     }
     return;
   }
   const int object_v = v - hand_v_size;
   const int column = v < hand_v_size ? v : motion_count_ + object_v;
   const double scale = object_v >= 0 && object_v < object_lengths(*model_) ? length_scale_ : 1.0;
-  for (int e = 0; e < kEquations; ++e) J[static_cast<std::ptrdiff_t>(e) * n + column] += scale * entries[e];
+  for (int e = 0; e < rows_per_contact_; ++e)
+    J[static_cast<std::ptrdiff_t>(e) * n + column] += scale * entries[rows_[e]];
 }
 
 void GraspSystem::linearize(const double* x, double* R, double* J) {
@@ -200,9 +223,11 @@ void GraspSystem::linearize(const double* x, double* R, double* J) {
   for (const Contact& contact : contacts_) {
     place_side(contact.hand, w, hand);
     place_side(contact.object, w, object);
-    contact_residual(hand, object, R);
+    double residuals[kEntries];
+    contact_entries(hand, object, residuals);
+    for (int e = 0; e < rows_per_contact_; ++e) *R++ = residuals[rows_[e]];
     const Eigen::Vector3d m = object.rotation * object.local.m;
-    const Eigen::Vector3d a = hand.rotation * hand.local.a, b = hand.rotation * hand.local.b;
+    const Eigen::Vector3d a = first_tangent(hand, hand.local.a, hand.local.m), b = hand.rotation * hand.local.b;
     const Eigen::Vector3d a_cross_m = a.cross(m), b_cross_m = b.cross(m);
     for (int v : model_->support(contact.hand.joint)) add_column(v, 1.0, hand.point, a_cross_m, b_cross_m, J);
     for (int v : model_->support(contact.object.joint)) add_column(v, -1.0, object.point, a_cross_m, b_cross_m, J);
@@ -210,14 +235,15 @@ void GraspSystem::linearize(const double* x, double* R, double* J) {
     // Free parameters: u and v of the hand's patch, then of the object's; lengths are in units of
     // length_scale.
     const auto fill = [&](double dx, double dy, double dz, double da, double db) {
-      const double entries[kEquations] = {dx, dy, dz, da, db};
-      for (int e = 0; e < kEquations; ++e) J[static_cast<std::ptrdiff_t>(e) * n + column] = entries[e];
+      const double entries[kEntries] = {dx, dy, dz, da, db};
+      for (int e = 0; e < rows_per_contact_; ++e) J[static_cast<std::ptrdiff_t>(e) * n + column] = entries[rows_[e]];
       ++column;
     };
-    const auto hand_column = [&](const Eigen::Vector3d& o_w, const Eigen::Vector3d& a_w, const Eigen::Vector3d& b_w,
-                                 double scale) {
+    const auto hand_column = [&](const Eigen::Vector3d& o_w, const Eigen::Vector3d& m_w, const Eigen::Vector3d& a_w,
+                                 const Eigen::Vector3d& b_w, double scale) {
       const Eigen::Vector3d d = hand.rotation * o_w * (scale / length_scale_);
-      fill(d.x(), d.y(), d.z(), scale * m.dot(hand.rotation * a_w), scale * m.dot(hand.rotation * b_w));
+      const double da = m.dot(first_tangent(hand, a_w, m_w)), db = m.dot(hand.rotation * b_w);
+      fill(d.x(), d.y(), d.z(), scale * da, scale * db);
     };
     const auto object_column = [&](const Eigen::Vector3d& o_w, const Eigen::Vector3d& m_w, double scale) {
       const Eigen::Vector3d d = object.rotation * o_w * (-scale / length_scale_);
@@ -226,12 +252,11 @@ void GraspSystem::linearize(const double* x, double* R, double* J) {
     };
     const double hand_u_scale = contact.hand.patch->u_is_angle() ? 1.0 : length_scale_;
     const double object_u_scale = contact.object.patch->u_is_angle() ? 1.0 : length_scale_;
-    if (contact.hand.u.free) hand_column(hand.local.o_u, hand.local.a_u, hand.local.b_u, hand_u_scale);
-    if (contact.hand.v.free) hand_column(hand.local.o_v, hand.local.a_v, hand.local.b_v, length_scale_);
+    if (contact.hand.u.free) hand_column(hand.local.o_u, hand.local.m_u, hand.local.a_u, hand.local.b_u, hand_u_scale);
+    if (contact.hand.v.free) hand_column(hand.local.o_v, hand.local.m_v, hand.local.a_v, hand.local.b_v, length_scale_);
     if (contact.object.u.free) object_column(object.local.o_u, object.local.m_u, object_u_scale);
     if (contact.object.v.free) object_column(object.local.o_v, object.local.m_v, length_scale_);
-    R += kEquations;
-    J += static_cast<std::ptrdiff_t>(kEquations) * n;
+    J += static_cast<std::ptrdiff_t>(rows_per_contact_) * n;
   }
 }
 
@@ -265,7 +290,7 @@ void GraspSystem::difference(const double* x0, const double* x1, double* out) co
   } else {
     std::fill_n(out, motion_count_, 0.0);
     for (int i = 0; i < hand_v_size; ++i)
-      for (int c = 0; c < motion_count_; ++c) out[c] += motions_(i, c) * velocity_[i];
+      for (int c = 0; c < motion_count_; ++c) out[c] += coordinates_(i, c) * velocity_[i];
   }
   const int lengths = object_lengths(*model_);
   for (int i = 0; i < object_v_size_; ++i)
@@ -282,7 +307,7 @@ void GraspSystem::embed(const double* x, double* out) const {
   if (model_->hand_is_euclidean()) {
     std::fill_n(out, motion_count_, 0.0);
     for (int i = 0; i < model_->hand_v_size(); ++i)
-      for (int c = 0; c < motion_count_; ++c) out[c] += motions_(i, c) * x[i];
+      for (int c = 0; c < motion_count_; ++c) out[c] += coordinates_(i, c) * x[i];
     out += motion_count_;
   } else {
     for (const JointInfo& joint : model_->hand_joints())

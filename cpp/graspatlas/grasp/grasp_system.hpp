@@ -26,7 +26,7 @@ struct ContactSide {
   PatchParameter u, v;
 };
 
-/// Points coincide and normals oppose, eqs (7) and (8): five equations.
+/// Points coincide and normals oppose, eqs (7) and (8): five equations, three in the plane.
 struct Contact {
   ContactSide hand, object;
 };
@@ -43,11 +43,13 @@ struct ContactPoint {
 /// contact by contact, hand before object, u before v. A tangent vector is [y, object, w]: y are velocities
 /// along the hand motions that are kept, so that eq (13), E_s' (q_hand - q_hand,1) = 0, holds by
 /// construction; lengths are divided by `length_scale`. Equations: for each contact three for the points
-/// (divided by length_scale) and two for the normals.
+/// (divided by length_scale) and two for the normals; in
+/// the plane two and one.
 class GraspSystem : public System {
  public:
-  /// `motions` [hand_v_size x p] are the hand motions kept, orthonormal columns; the identity keeps them all.
-  /// Limits [hand_q_size] apply to joints with one number each; infinite ones are none.
+  /// Columns of `motions` [hand_v_size x p] are the joint velocities of the hand motions kept, each of length one in
+  /// the metric of the tangent space: orthonormal for revolute joints; the identity keeps them all. Limits
+  /// [hand_q_size] apply to joints with one number each; infinite ones are none.
   GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> contacts, const Matrix& motions, double length_scale,
               const std::vector<double>& lower, const std::vector<double>& upper);
 
@@ -94,15 +96,18 @@ class GraspSystem : public System {
   void add_joint_bounds(const std::vector<double>& lower, const std::vector<double>& upper);
   void add_parameter_bounds();
   void place_side(const ContactSide& side, const double*& w, SideState& out) const;
-  void contact_residual(const SideState& hand, const SideState& object, double* R) const;
+  void contact_entries(const SideState& hand, const SideState& object, double* entries) const;
+  Eigen::Vector3d first_tangent(const SideState& hand, const Eigen::Vector3d& a, const Eigen::Vector3d& normal) const;
   void add_column(int v, double sign, const Eigen::Vector3d& point, const Eigen::Vector3d& a_cross_m,
                   const Eigen::Vector3d& b_cross_m, double* J) const;
 
   std::shared_ptr<Model> model_;
   std::vector<Contact> contacts_;
-  RowMatrix motions_;
+  RowMatrix motions_;      // columns are the hand motions kept, in joint velocities
+  RowMatrix coordinates_;  // its pseudo-inverse, transposed: joint velocities along the motions
   bool all_motions_;
-  int motion_count_, object_v_size_;
+  int motion_count_, object_v_size_, rows_per_contact_;
+  const int* rows_;  // of the entries of a contact, those that are equations
   double length_scale_;
   std::vector<FreeParameter> parameters_;
   std::vector<Bound> bounds_;

@@ -44,7 +44,10 @@ Model::Model(const std::string& urdf, ObjectJoint object) : pinocchio_(new Pinoc
   hand_q_size_ = model.nq;
   hand_v_size_ = model.nv;
   for (pinocchio::JointIndex j = 1; j < static_cast<pinocchio::JointIndex>(model.njoints); ++j) {
-    hand_joints_.push_back({model.names[j], model.idx_qs[j], model.nqs[j], model.idx_vs[j], model.nvs[j]});
+    const std::string kind = model.joints[j].shortname();
+    const bool prismatic = kind.find("Prismatic") != std::string::npos || kind.rfind("JointModelP", 0) == 0;
+    hand_joints_.push_back({model.names[j], model.idx_qs[j], model.nqs[j], model.idx_vs[j], model.nvs[j],
+                            prismatic && model.nqs[j] == 1});
     if (model.nqs[j] != model.nvs[j]) hand_is_euclidean_ = false;
   }
   for (const pinocchio::Frame& frame : model.frames) {

@@ -14,6 +14,7 @@ enum class ObjectJoint { free_flyer, planar, none };
 struct JointInfo {
   std::string name;
   int q_index, q_size, v_index, v_size;
+  bool prismatic;  ///< its q is a length [m]
 };
 
 struct FrameInfo {
