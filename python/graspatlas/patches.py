@@ -165,7 +165,10 @@ class Plane(Patch):
 
 @dataclass(frozen=True)
 class _Turned(Patch):
-    """A surface of revolution about an axis; u is the angle [rad], v the height along the axis [m]."""
+    """A surface of revolution about an axis; u is the angle [rad], v the height along the axis [m].
+
+    u turns from ``u_axis`` towards ``u_axis`` x ``axis``: about +y from x to z, and about -z from x to y.
+    """
 
     origin: Vector3 = (0.0, 0.0, 0.0)
     axis: Vector3 = (0.0, 1.0, 0.0)
@@ -203,13 +206,19 @@ class _Turned(Patch):
         low, high = self.default_v_interval()
         heights = np.linspace(max(low, y - 1.0), min(high, y + 1.0), 2001)
         if self.kind == "cylinder" or heights[0] >= heights[-1]:
-            return (float(np.arctan2(z, x)), float(y))
+            return (self._angle(x, z), float(y))
         for _ in range(3):
             gap = np.hypot(self.radius_at(heights) - np.hypot(x, z), heights - y)
             best = int(np.argmin(gap))
             step = heights[1] - heights[0]
             heights = np.linspace(heights[best] - step, heights[best] + step, 2001)
-        return (float(np.arctan2(z, x)), float(heights[1000]))
+        return (self._angle(x, z), float(heights[1000]))
+
+    def _angle(self, x: float, z: float) -> float:
+        """Angle of a point across the axis [rad]: within half a turn of the middle of ``u_interval``."""
+        middle = 0.0 if self.u_interval is None else 0.5 * sum(self.u_interval)
+        angle = float(np.arctan2(z, x))
+        return angle - 2.0 * np.pi * float(np.round((angle - middle) / (2.0 * np.pi)))
 
     def radius_at(self, v: ArrayLike) -> Array:
         """Radius [m] at heights v [m]."""
@@ -232,7 +241,7 @@ class Cylinder(_Turned):
     Attributes:
         radius: R [m].
         origin, axis: A point of the axis [m] and its direction, +y by default.
-        u_axis: Direction of u = 0.
+        u_axis: Direction of u = 0; u turns from it towards u_axis x axis.
         u_interval: Angles [rad]; None for the whole circle.
         v_interval: Heights along the axis, from the origin [m]; None for all.
     """

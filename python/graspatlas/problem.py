@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import resources
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -360,7 +361,13 @@ class Problem:
         E_s = self.motions.reordered(self.hand.joints).frozen(s)
         difference = self.full_system.difference
         nv = self.hand.model.hand_v_size
-        return np.array([(self._joint_units * difference(self.x1_array, x)[:nv]) @ E_s for x in rows])
+        residuals = np.array([(self._joint_units * difference(self.x1_array, x)[:nv]) @ E_s for x in rows])
+        # A continuous joint may have gone round: of all its turns, the one that fits.
+        turning = [joint.v_index for joint in self.hand.model.hand_joints if joint.q_size == 2 and joint.v_size == 1]
+        turns = np.array(list(product((0, -1, 1), repeat=len(turning)))) * 2.0 * np.pi
+        candidates = residuals[:, None, :] + turns @ E_s[turning]
+        fitting = np.abs(candidates).max(axis=2).argmin(axis=1)
+        return np.asarray(candidates[np.arange(len(rows)), fitting])
 
     def to_dict(self) -> dict[str, Any]:
         """The problem as plain data that :meth:`from_dict` reads, with the text of its URDFs."""
