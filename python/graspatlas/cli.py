@@ -129,7 +129,7 @@ def _report(result: Result, folder: Path | None) -> str:
     summary = result.summary()
     seconds, quality, best = summary["seconds"], summary["quality"], result.best
     closed = {reason: count for reason, count in result.atlas.closed_vertices.items() if count}
-    angles = "\n".join(f"    {name:20} {value:9.4f}" for name, value in zip(best.joints, best.q, strict=True))
+    angles = "\n".join(f"    {name:20} {value:9.4f}" for name, value in best.joint_positions.items())
     lines = [
         f"{summary['problem']}: {summary['n_charts']} charts of dimension {summary['dimension']} in "
         f"{seconds['atlas']:.3f} s, index in {seconds['quality']:.3f} s; {summary['status']}",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -28,7 +28,8 @@ class Grasp:
     Attributes:
         x: The grasp as a point of the manifold [configuration_size].
         q: Joint configuration of the hand [nq], in the order of ``joints``.
-        joints: Names of the joints.
+        joints: Names of the joints, in the order of q.
+        joint_positions: Position of each joint by name [rad or m]; of a continuous joint the angle in [-pi, pi].
         T_palm_object: Pose of the object in the palm's frame [4, 4].
         contact_points: Contact points in the palm's frame [m, 3], metres.
         contact_normals: Outward unit normals of the object there [m, 3].
@@ -42,6 +43,7 @@ class Grasp:
     x: Array
     q: Array
     joints: tuple[str, ...]
+    joint_positions: Mapping[str, float]
     T_palm_object: Array
     contact_points: Array
     contact_normals: Array
@@ -62,7 +64,7 @@ class Grasp:
         return np.asarray(Rotation.from_matrix(self.T_palm_object[:3, :3]).as_quat())
 
     def __str__(self) -> str:
-        angles = ", ".join(f"{name} {value:.3f}" for name, value in zip(self.joints, self.q, strict=False))
+        angles = ", ".join(f"{name} {value:.3f}" for name, value in self.joint_positions.items())
         xyz = ", ".join(f"{value:.4f}" for value in self.object_xyz)
         return f"quality {self.quality:.6g} at chart {self.chart}: object at ({xyz}) m; {angles}"
 
@@ -139,6 +141,7 @@ class Grasps:
             x=one.x[0],
             q=one.q[0],
             joints=self.joints,
+            joint_positions=self.problem.hand.joint_positions(one.q[0]),
             T_palm_object=one.T_palm_object[0],
             contact_points=one.contact_points[0],
             contact_normals=one.contact_normals[0],

@@ -165,6 +165,17 @@ class Hand(Body):
                 lower[joint.q_index], upper[joint.q_index] = self.limits[joint.name]
         return lower, upper
 
+    def joint_positions(self, q: NDArray[np.float64]) -> dict[str, float]:
+        """Position of each joint with one degree of freedom [rad or m], from q [nq]."""
+        positions = {}
+        for joint in self.model.hand_joints:
+            at = joint.q_index
+            if joint.q_size == 1:
+                positions[joint.name] = float(q[at])
+            elif joint.v_size == 1:
+                positions[joint.name] = float(np.arctan2(q[at + 1], q[at]))
+        return positions
+
     def link_placements(self, q: NDArray[np.float64]) -> dict[str, Array]:
         """T_palm_link [4, 4] of every link and frame at joint configuration q [nq]."""
         return {name: np.asarray(T) for name, T in self.model.frame_placements(np.asarray(q, float)).items()}

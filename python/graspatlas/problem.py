@@ -171,7 +171,9 @@ class Problem:
     def _check_plane(self) -> None:
         x, y, z, _ = self.x1.object_quat_xyzw
         if self.object_joint == "planar" and max(abs(self.x1.object_xyz[2]), abs(x), abs(y)) > 1e-9:
-            raise GraspAtlasError("in a planar problem x1's object lies in the x-y plane: z = 0, and turned about z only")
+            raise GraspAtlasError(
+                "in a planar problem x1's object lies in the x-y plane: z = 0, and turned about z only"
+            )
 
     def _check_x1(self) -> None:
         arrays = self.full_system.grasp_arrays(self.x1_array[None])

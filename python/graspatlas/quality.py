@@ -47,20 +47,31 @@ def batched(index: F) -> F:
     return index
 
 
-def _axes(grasps: Grasps) -> Array:
+def _axes(grasps: Grasps, length_unit: float) -> Array:
     """Semi-axes over the motions that are coordinated at x1 [n, connectivity]; zero where a grasp has lost one."""
     x1 = grasps.problem.x1_array
-    connectivity = int((_core.semi_axes(grasps.system, x1[None], grasps.LENGTH_UNIT) > 0.0).sum())
-    return grasps.semi_axes[:, grasps.semi_axes.shape[1] - connectivity :]
+    connectivity = int((_core.semi_axes(grasps.system, x1[None], length_unit) > 0.0).sum())
+    if length_unit == grasps.LENGTH_UNIT:
+        axes = grasps.semi_axes
+    else:
+        axes = np.asarray(_core.semi_axes(grasps.system, grasps.x, length_unit))
+    return axes[:, axes.shape[1] - connectivity :]
 
 
 @batched
-def inverse_condition_number(grasps: Grasps) -> Array:
-    """Smallest over largest semi-axis of the manipulability ellipsoid [n]; 1 is a sphere, 0 a singular grasp.
+def inverse_condition_number(grasps: Grasps, length_unit: float = Grasps.LENGTH_UNIT) -> Array:
+    """Smallest over largest semi-axis of the manipulability ellipsoid: 1 is a sphere, 0 a singular grasp.
+
+    Args:
+        grasps: The grasps.
+        length_unit: Unit of lengths in the object's velocity [m]; millimetres by default.
+
+    Returns:
+        One value for each grasp [n].
 
     Source: "Global Optimization of Robotic Grasps", Section V, first index.
     """
-    axes = _axes(grasps)
+    axes = _axes(grasps, length_unit)
     if axes.shape[1] == 0:
         return np.zeros(len(grasps))
     largest = axes[:, -1]
@@ -68,22 +79,36 @@ def inverse_condition_number(grasps: Grasps) -> Array:
 
 
 @batched
-def manipulability_volume(grasps: Grasps) -> Array:
-    """Product of the semi-axes of the manipulability ellipsoid [n], proportional to its volume; lengths in mm.
+def manipulability_volume(grasps: Grasps, length_unit: float = Grasps.LENGTH_UNIT) -> Array:
+    """Product of the semi-axes of the manipulability ellipsoid, proportional to its volume; lengths in mm.
+
+    Args:
+        grasps: The grasps.
+        length_unit: Unit of lengths in the object's velocity [m]; millimetres by default.
+
+    Returns:
+        One value for each grasp [n].
 
     Source: "Global Optimization of Robotic Grasps", Section V, second index.
     """
-    axes = _axes(grasps)
+    axes = _axes(grasps, length_unit)
     return np.asarray(axes.prod(axis=1)) if axes.shape[1] else np.zeros(len(grasps))
 
 
 @batched
-def smallest_semi_axis(grasps: Grasps) -> Array:
-    """Smallest semi-axis of the manipulability ellipsoid [n]; lengths in mm.
+def smallest_semi_axis(grasps: Grasps, length_unit: float = Grasps.LENGTH_UNIT) -> Array:
+    """Smallest semi-axis of the manipulability ellipsoid; lengths in mm.
+
+    Args:
+        grasps: The grasps.
+        length_unit: Unit of lengths in the object's velocity [m]; millimetres by default.
+
+    Returns:
+        One value for each grasp [n].
 
     Source: "Global Optimization of Robotic Grasps", Section V, third index.
     """
-    axes = _axes(grasps)
+    axes = _axes(grasps, length_unit)
     return axes[:, 0].copy() if axes.shape[1] else np.zeros(len(grasps))
 
 
