@@ -2,12 +2,14 @@
 
 from graspatlas import motions, patches, quality, systems
 from graspatlas.atlas import Atlas, Closed, Status
+from graspatlas.contacts import Contact, FirstGrasp
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasp, Grasps
 from graspatlas.hand import Body, Hand
 from graspatlas.motions import HandMotions
 from graspatlas.optimizer import build_atlas, optimize
-from graspatlas.problem import Contact, FirstGrasp, Problem, bundled_problems, load_problem
+from graspatlas.problem import Problem
+from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.quality import batched
 from graspatlas.result import Result, load_result
 from graspatlas.systems import System

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +16,7 @@ from graspatlas import __version__
 from graspatlas.atlas import Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.optimizer import optimize
-from graspatlas.problem import bundled_problems, load_problem
+from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.quality import INDICES
 from graspatlas.result import Result, load_result, writable_folder
 
@@ -40,6 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except GraspAtlasError as error:
         print(f"graspatlas: error: {error}", file=sys.stderr)
         return MISUSE
+    except BrokenPipeError:  # the reader of our output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except KeyboardInterrupt:
         print("graspatlas: interrupted", file=sys.stderr)
         return INTERRUPTED

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.tables import checked_table, numbers
 
 __all__ = ["Body", "Hand", "robots_folder"]
 
@@ -97,6 +100,42 @@ class Body:
         """
         return cls(**cls._read(urdf, name, srdf, folder))  # type: ignore[arg-type]
 
+    def to_dict(self) -> dict[str, Any]:
+        """The body as plain data, with the text of its URDF."""
+        return {"name": self.name, "urdf": self.urdf_path, "urdf_text": self.urdf, "srdf_text": self.srdf}
+
+    @classmethod
+    def _arguments(cls, data: Mapping[str, Any], folder: Path | None) -> dict[str, object]:
+        """Arguments from a table: read from its URDF file, or from the text that a stored problem carries."""
+        table = checked_table(data, f"a {cls.__name__.lower()}", ("urdf",), ("name", "srdf", "urdf_text", "srdf_text"))
+        path, name = str(table["urdf"]), table.get("name")
+        if not table.get("urdf_text"):
+            return cls._read(path, name, table.get("srdf"), folder)
+        try:
+            package_dirs = cls._read(path, name, None, folder)["package_dirs"]
+        except GraspAtlasError:
+            package_dirs = (str(robots_folder()),)
+        return {
+            "name": str(name),
+            "urdf": str(table["urdf_text"]),
+            "urdf_path": path,
+            "package_dirs": package_dirs,
+            "srdf": str(table.get("srdf_text") or ""),
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], folder: Path | None = None) -> Body:
+        """The body that a problem file or :meth:`to_dict` describes.
+
+        Args:
+            data: ``urdf``, and perhaps ``name`` and ``srdf``.
+            folder: Where relative paths start.
+
+        Raises:
+            GraspAtlasError: If something is missing or wrong.
+        """
+        return cls(**cls._arguments(data, folder))  # type: ignore[arg-type]
+
 
 @dataclass(frozen=True)
 class Hand(Body):
@@ -112,6 +151,8 @@ class Hand(Body):
         for joint in self.limits:
             if joint not in self.joints:
                 raise unknown_name("joint", joint, self.joints, f"in hand '{self.name}'")
+            if len(self.limits[joint]) != 2 or not self.limits[joint][0] <= self.limits[joint][1]:
+                raise GraspAtlasError(f"limits of joint '{joint}' must be (lower, upper), got {self.limits[joint]}")
 
     @classmethod
     def from_urdf(
@@ -125,6 +166,18 @@ class Hand(Body):
     ) -> Hand:
         """Read a hand from a URDF file; see :meth:`Body.from_urdf`."""
         return cls(**cls._read(urdf, name, srdf, folder), limits=dict(limits or {}))  # type: ignore[arg-type]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The hand as plain data, with the text of its URDF."""
+        return {**super().to_dict(), "limits": {name: list(pair) for name, pair in self.limits.items()}}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], folder: Path | None = None) -> Hand:
+        """The hand that a problem file or :meth:`to_dict` describes; see :meth:`Body.from_dict`."""
+        table = dict(checked_table(data, "a hand", ("urdf",), None))
+        stated = checked_table(table.pop("limits", None) or {}, "limits", (), None)
+        limits = {name: numbers(pair, f"limits of joint '{name}'") for name, pair in stated.items()}
+        return cls(**cls._arguments(table, folder), limits=limits)  # type: ignore[arg-type]
 
     @cached_property
     def model(self) -> _core.Model:

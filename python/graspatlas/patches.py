@@ -33,7 +33,8 @@ def _vector(value: ArrayLike, what: str, *, unit: bool = False) -> Vector3:
         length = float(np.linalg.norm(array))
         if length < 1e-9:
             raise GraspAtlasError(f"{what} must not be zero")
-        array = array / length
+        if abs(length - 1.0) > 1e-12:  # a unit vector stays as it came, so that a stored patch is the same patch
+            array = array / length
     return (float(array[0]), float(array[1]), float(array[2]))
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib import resources
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -15,12 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graspatlas import _core
+from graspatlas.contacts import Contact, FirstGrasp
 from graspatlas.errors import GraspAtlasError, unknown_name
-from graspatlas.hand import Body, Hand, robots_folder
+from graspatlas.hand import Body, Hand
 from graspatlas.motions import HandMotions
-from graspatlas.patches import Patch, patch_from_dict
+from graspatlas.patches import Patch
+from graspatlas.tables import checked_table, number
 
-__all__ = ["Contact", "FirstGrasp", "Problem", "bundled_problems", "load_problem"]
+__all__ = ["Problem"]
 
 Array = NDArray[np.float64]
 
@@ -29,84 +29,10 @@ CONTACT_TOLERANCE = 1e-3
 NORMAL_TOLERANCE = 0.05
 #: Ways in which the object can move.
 OBJECT_JOINTS = ("free_flyer", "planar")
+#: Options of `optimize` that a problem may give.
+DEFAULTS = ("dimension", "radius", "epsilon", "quality")
 #: How far a first grasp may break a joint limit or leave a patch [rad or m].
 LIMIT_TOLERANCE = 1e-9
-
-
-@dataclass(frozen=True)
-class Contact:
-    """Two patches that touch: their points coincide and their normals oppose, eqs (7) and (8).
-
-    Attributes:
-        frame: Link or frame of the hand that carries the hand's patch.
-        hand: Patch in that frame; its normal points out of the hand.
-        object: Patch in the object's frame; its normal points out of the object.
-        frozen: Values of the parameters of the object's patch that do not move, such as ``{"u": 0.5}`` [rad or m].
-        hand_frozen: The same for the hand's patch.
-    """
-
-    frame: str
-    hand: Patch
-    object: Patch
-    frozen: Mapping[str, float] = field(default_factory=dict)
-    hand_frozen: Mapping[str, float] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        for patch, frozen in ((self.object, self.frozen), (self.hand, self.hand_frozen)):
-            for name, value in frozen.items():
-                if name not in patch.parameters:
-                    raise unknown_name("parameter", name, patch.parameters, f"one of a {patch.kind} patch's")
-                if not np.isfinite(value):
-                    raise GraspAtlasError(f"parameter '{name}' is frozen at {value}; it must be finite")
-
-    def free(self) -> list[tuple[Patch, str]]:
-        """Patches and names of the free parameters, in the order in which they stand in x."""
-        sides = ((self.hand, self.hand_frozen), (self.object, self.frozen))
-        return [(patch, name) for patch, frozen in sides for name in patch.parameters if name not in frozen]
-
-    def to_dict(self) -> dict[str, Any]:
-        """The contact as plain data."""
-        return {
-            "frame": self.frame,
-            "hand": self.hand.to_dict(),
-            "object": self.object.to_dict(),
-            "frozen": dict(self.frozen),
-            "hand_frozen": dict(self.hand_frozen),
-        }
-
-
-@dataclass(frozen=True)
-class FirstGrasp:
-    """A feasible grasp x1 from which the atlas grows.
-
-    Attributes:
-        joints: Joint positions by name [rad or m]; all of the hand's.
-        object_xyz: Position of the object in the palm's frame [m].
-        object_quat_xyzw: Its rotation; normalised.
-        parameters: Free patch parameters in the order of x; found from the contact points when not given.
-    """
-
-    joints: Mapping[str, float]
-    object_xyz: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    object_quat_xyzw: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
-    parameters: tuple[float, ...] | None = None
-
-    def __post_init__(self) -> None:
-        numbers = [
-            *self.joints.values(),
-            *self.object_xyz,
-            *self.object_quat_xyzw,
-            *(self.parameters or ()),
-        ]
-        if not np.isfinite(np.asarray(numbers, float)).all():
-            raise GraspAtlasError("x1 holds a number that is not finite")
-        if len(self.object_xyz) != 3 or len(self.object_quat_xyzw) != 4:
-            raise GraspAtlasError("x1 needs object_xyz of 3 numbers and object_quat_xyzw of 4")
-        norm = float(np.linalg.norm(self.object_quat_xyzw))
-        if norm < 1e-6:
-            raise GraspAtlasError("x1 has a quaternion of length zero")
-        x, y, z, w = (float(c) / norm for c in self.object_quat_xyzw)
-        object.__setattr__(self, "object_quat_xyzw", (x, y, z, w))
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +95,7 @@ class Problem:
             )
 
     def _check_plane(self) -> None:
-        x, y, z, _ = self.x1.object_quat_xyzw
+        x, y, _, _ = self.x1.object_quat_xyzw
         if self.object_joint == "planar" and max(abs(self.x1.object_xyz[2]), abs(x), abs(y)) > 1e-9:
             raise GraspAtlasError(
                 "in a planar problem x1's object lies in the x-y plane: z = 0, and turned about z only"
@@ -377,20 +303,12 @@ class Problem:
             "name": self.name,
             "description": self.description,
             "source": self.source,
-            "hand": {
-                **_body_dict(self.hand),
-                "limits": {k: list(v) for k, v in self.hand.limits.items()},
-            },
-            "object": {**_body_dict(self.object), "joint": self.object_joint},
+            "hand": self.hand.to_dict(),
+            "object": {**self.object.to_dict(), "joint": self.object_joint},
             "length_scale": self.length_scale,
             "contacts": [contact.to_dict() for contact in self.contacts],
             "hand_motions": self.motions.to_dict() if self.motions else None,
-            "x1": {
-                "joints": dict(self.x1.joints),
-                "object_xyz": list(self.x1.object_xyz),
-                "object_quat_xyzw": list(self.x1.object_quat_xyzw),
-                "parameters": None if self.x1.parameters is None else list(self.x1.parameters),
-            },
+            "x1": self.x1.to_dict(),
             "defaults": dict(self.defaults),
         }
 
@@ -405,48 +323,25 @@ class Problem:
         Raises:
             GraspAtlasError: If something is missing or wrong.
         """
-        if not isinstance(data, Mapping):
-            raise GraspAtlasError("a problem is a table with a name, a hand, an object, contacts and x1")
-        for key in ("name", "hand", "object", "contacts", "x1"):
-            if key not in data:
-                raise GraspAtlasError(f"the problem has no '{key}'")
-        hand_data = dict(data["hand"])
-        limits = {name: (float(v[0]), float(v[1])) for name, v in (hand_data.pop("limits", None) or {}).items()}
-        first = data["x1"]
-        try:
-            x1 = FirstGrasp(
-                joints={k: float(v) for k, v in first["joints"].items()},
-                object_xyz=tuple(map(float, first["object_xyz"])),  # type: ignore[arg-type]
-                object_quat_xyzw=tuple(map(float, first["object_quat_xyzw"])),  # type: ignore[arg-type]
-                parameters=tuple(map(float, first["parameters"])) if first.get("parameters") else None,
-            )
-            contacts = tuple(
-                Contact(
-                    frame=item["frame"],
-                    hand=patch_from_dict(item["hand"]),
-                    object=patch_from_dict(item["object"]),
-                    frozen=dict(item.get("frozen") or {}),
-                    hand_frozen=dict(item.get("hand_frozen") or {}),
-                )
-                for item in data["contacts"]
-            )
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            if isinstance(error, GraspAtlasError):
-                raise
-            raise GraspAtlasError(f"x1 or a contact of the problem is not complete: {error!r}") from None
-        motions = data.get("hand_motions")
+        optional = ("description", "source", "length_scale", "hand_motions", "defaults")
+        table = checked_table(data, "the problem", ("name", "hand", "object", "contacts", "x1"), optional)
+        body = dict(checked_table(table["object"], "the object", ("urdf",), None))
+        object_joint = str(body.pop("joint", "free_flyer"))
+        motions = table.get("hand_motions")
+        if not isinstance(table["contacts"], list):
+            raise GraspAtlasError("contacts must be a list of tables")
         return cls(
-            name=str(data["name"]),
-            hand=Hand(**_body_arguments(hand_data, folder), limits=limits),
-            object=Body(**_body_arguments(data["object"], folder)),
-            object_joint=str(data["object"].get("joint", "free_flyer")),
-            contacts=contacts,
-            x1=x1,
+            name=str(table["name"]),
+            hand=Hand.from_dict(table["hand"], folder),
+            object=Body.from_dict(body, folder),
+            object_joint=object_joint,
+            contacts=tuple(Contact.from_dict(item) for item in table["contacts"]),
+            x1=FirstGrasp.from_dict(table["x1"]),
             motions=HandMotions.from_dict(motions) if motions else None,
-            length_scale=float(data.get("length_scale", 0.01)),
-            defaults=dict(data.get("defaults") or {}),
-            description=str(data.get("description", "")),
-            source=str(data.get("source", "")),
+            length_scale=number(table.get("length_scale", 0.01), "length_scale"),
+            defaults=dict(checked_table(table.get("defaults") or {}, "defaults", (), DEFAULTS)),
+            description=str(table.get("description", "")),
+            source=str(table.get("source", "")),
         )
 
 
@@ -459,67 +354,3 @@ def _inverse(T: Array) -> Array:
     inverse[:3, :3] = T[:3, :3].T
     inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
     return inverse
-
-
-def _body_dict(body: Body) -> dict[str, Any]:
-    return {
-        "name": body.name,
-        "urdf": body.urdf_path,
-        "urdf_text": body.urdf,
-        "srdf_text": body.srdf,
-    }
-
-
-def _body_arguments(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
-    """Arguments of a Body: read from its URDF file, or from the text that a stored problem carries."""
-    if "urdf" not in data:
-        raise GraspAtlasError(f"hand and object need a 'urdf', got {sorted(data)}")
-    name = data.get("name")
-    if data.get("urdf_text"):
-        try:
-            found = Body.from_urdf(data["urdf"], folder=folder).package_dirs
-        except GraspAtlasError:
-            found = (str(robots_folder()),)
-        text, srdf = str(data["urdf_text"]), str(data.get("srdf_text") or "")
-        return {
-            "name": str(name),
-            "urdf": text,
-            "urdf_path": str(data["urdf"]),
-            "package_dirs": found,
-            "srdf": srdf,
-        }
-    return vars(Body.from_urdf(data["urdf"], name=name, srdf=data.get("srdf"), folder=folder))
-
-
-def bundled_problems() -> list[str]:
-    """Names of the problems that come with the package."""
-    folder = resources.files("graspatlas") / "problems"
-    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".json"))
-
-
-def load_problem(name: str | Path) -> Problem:
-    """Load a problem by its bundled name, or from a problem file (JSON).
-
-    Args:
-        name: Such as ``"schunk_can"``, or a path that ends in ``.json``.
-
-    Raises:
-        GraspAtlasError: If there is no such problem, or its file is damaged or wrong.
-    """
-    folder: Path | None = None
-    if str(name) in bundled_problems():
-        text = (resources.files("graspatlas") / "problems" / f"{name}.json").read_text(encoding="utf-8")
-    else:
-        path = Path(name)
-        if path.suffix != ".json" and not path.is_file():
-            raise unknown_name("problem", name, bundled_problems())
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise GraspAtlasError(f"cannot read problem file '{path}': {error}") from None
-        folder = path.parent
-    try:
-        data = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise GraspAtlasError(f"problem file '{name}' is not JSON: {error}") from None
-    return Problem.from_dict(data, folder)

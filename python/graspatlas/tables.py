@@ -1,0 +1,58 @@
+"""Plain data from files, checked: tables with known keys, numbers where numbers belong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from graspatlas.errors import GraspAtlasError, unknown_name
+
+__all__ = ["checked_table", "number", "numbers"]
+
+
+def checked_table(
+    data: Any, what: str, required: Sequence[str], optional: Sequence[str] | None = ()
+) -> Mapping[str, Any]:
+    """A table, with all the keys that it needs and none that is not known.
+
+    Args:
+        data: What came.
+        what: Its name for the message.
+        required: Keys that it must have.
+        optional: Keys that it may have; None allows any.
+
+    Raises:
+        GraspAtlasError: If it is no table, lacks a key, or has an unknown one.
+    """
+    if not isinstance(data, Mapping):
+        raise GraspAtlasError(f"{what} must be a table, got {data!r}")
+    for key in required:
+        if key not in data:
+            raise GraspAtlasError(f"{what} has no '{key}'")
+    if optional is not None:
+        for key in data:
+            if key not in required and key not in optional:
+                raise unknown_name("key", key, [*required, *optional], f"one of {what}'s")
+    return data
+
+
+def number(value: Any, what: str) -> float:
+    """A number.
+
+    Raises:
+        GraspAtlasError: If it is none.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise GraspAtlasError(f"{what} must be a number, got {value!r}")
+    return float(value)
+
+
+def numbers(value: Any, what: str) -> tuple[float, ...]:
+    """A row of numbers.
+
+    Raises:
+        GraspAtlasError: If it is none.
+    """
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise GraspAtlasError(f"{what} must be a list of numbers, got {value!r}")
+    return tuple(number(item, what) for item in value)
