@@ -182,6 +182,11 @@ class Hand(Body):
     @cached_property
     def model(self) -> _core.Model:
         """The hand alone, as a kinematic tree."""
+        if "<mimic" in self.urdf:
+            raise GraspAtlasError(
+                f"hand '{self.name}' has a joint that mimics another; coupled joints are not supported: drop the joint's "
+                "<mimic> and state the coupling by the hand motions"
+            )
         try:
             return _core.Model(self.urdf, "none")
         except GraspAtlasError as error:

@@ -85,6 +85,12 @@ class Problem:
         for name in self.x1.joints:
             if name not in self.hand.joints:
                 raise unknown_name("joint", name, self.hand.joints, f"in hand '{self.hand.name}'")
+        for joint in self.hand.model.hand_joints:
+            if joint.v_size != 1:
+                raise GraspAtlasError(
+                    f"joint '{joint.name}' of hand '{self.hand.name}' has {joint.v_size} degrees of freedom; "
+                    "a hand's joints must have one each"
+                )
         missing = [name for name in self.hand.joints if name not in self.x1.joints]
         if missing:
             raise GraspAtlasError(f"x1 gives no position for joint '{missing[0]}' of hand '{self.hand.name}'")

@@ -1,5 +1,7 @@
 #include "graspatlas/grasp/model.hpp"
 
+#include <console_bridge/console.h>
+
 #include <pinocchio/algorithm/jacobian.hpp>
 #include <pinocchio/algorithm/joint-configuration.hpp>
 #include <pinocchio/algorithm/kinematics.hpp>
@@ -21,14 +23,43 @@ using ConstNumbers = Eigen::Map<const Eigen::Matrix<double, n, 1>>;
 
 std::vector<double> to_std(const Eigen::VectorXd& v) { return {v.data(), v.data() + v.size()}; }
 
+/// Collects what the URDF parser would print, for the message of our error.
+class ParserMessages : public console_bridge::OutputHandler {
+ public:
+  ParserMessages() { console_bridge::useOutputHandler(this); }
+  ~ParserMessages() override { console_bridge::restorePreviousOutputHandler(); }
+  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
+    if (level < console_bridge::CONSOLE_BRIDGE_LOG_ERROR) return;
+    if (!text_.empty()) text_ += "; ";
+    text_ += text;
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
 pinocchio::Model build_model(const std::string& urdf) {
   pinocchio::Model model;
+  ParserMessages messages;
   try {
     pinocchio::urdf::buildModelFromXML(urdf, model);
   } catch (const std::exception& error) {
-    throw Error(std::string("the hand's URDF cannot be read: ") + error.what());
+    const std::string reason = messages.text().empty() ? error.what() : messages.text();
+    throw Error("its URDF cannot be read: " + reason);
   }
+  if (model.nv == 0) throw Error("its URDF has no joint that moves");
   return model;
+}
+
+// A zero axis gives a joint that goes nowhere, or numbers that are none.
+void check_axes(const pinocchio::Model& model) {
+  pinocchio::Data data(model);
+  pinocchio::computeJointJacobians(model, data, pinocchio::neutral(model));
+  for (pinocchio::JointIndex j = 1; j < static_cast<pinocchio::JointIndex>(model.njoints); ++j)
+    for (int v = 0; v < model.nvs[j]; ++v)
+      if (!(data.J.col(model.idx_vs[j] + v).norm() > 1e-9) || !data.J.col(model.idx_vs[j] + v).allFinite())
+        throw Error("joint '" + model.names[j] + "' of its URDF has no valid axis");
 }
 
 }  // namespace
@@ -41,13 +72,14 @@ struct Model::Pinocchio {
 Model::Model(const std::string& urdf, ObjectJoint object) : pinocchio_(new Pinocchio), object_kind_(object) {
   pinocchio::Model& model = pinocchio_->model;
   model = build_model(urdf);
+  check_axes(model);
   hand_q_size_ = model.nq;
   hand_v_size_ = model.nv;
   for (pinocchio::JointIndex j = 1; j < static_cast<pinocchio::JointIndex>(model.njoints); ++j) {
     const std::string kind = model.joints[j].shortname();
     const bool prismatic = kind.find("Prismatic") != std::string::npos || kind.rfind("JointModelP", 0) == 0;
-    hand_joints_.push_back({model.names[j], model.idx_qs[j], model.nqs[j], model.idx_vs[j], model.nvs[j],
-                            prismatic && model.nqs[j] == 1});
+    hand_joints_.push_back(
+        {model.names[j], model.idx_qs[j], model.nqs[j], model.idx_vs[j], model.nvs[j], prismatic && model.nqs[j] == 1});
     if (model.nqs[j] != model.nvs[j]) hand_is_euclidean_ = false;
   }
   for (const pinocchio::Frame& frame : model.frames) {
@@ -60,7 +92,6 @@ Model::Model(const std::string& urdf, ObjectJoint object) : pinocchio_(new Pinoc
     object_joint_ = static_cast<int>(model.addJoint(0, pinocchio::JointModelFreeFlyer(), identity, "object"));
   else if (object == ObjectJoint::planar)
     object_joint_ = static_cast<int>(model.addJoint(0, pinocchio::JointModelPlanar(), identity, "object"));
-  if (model.nv == 0) throw Error("the hand's URDF has no joint that moves");
   pinocchio_->data = pinocchio::Data(model);
   placements_.resize(model.njoints);
   supports_.resize(model.njoints);
