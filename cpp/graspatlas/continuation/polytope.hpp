@@ -30,7 +30,7 @@ class Polytope {
   std::uint8_t state(int i) const { return state_[i]; }
   void close(int i, std::uint8_t reason) { state_[i] = reason; }
 
-  /// First vertex outside the ball of this radius that is not closed; -1 if there is none.
+  /// Farthest vertex outside the ball of this radius that is not closed; -1 if there is none.
   int expandable_vertex(double radius) const;
 
   /// Facets are numbered 0 .. facet_slots()-1; a slot whose facet was cut away entirely is not active.

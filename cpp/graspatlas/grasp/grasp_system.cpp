@@ -98,18 +98,10 @@ GraspSystem::GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> cont
     const Bound& bound = bounds_[i];
     const auto row = static_cast<Eigen::Index>(i);
     if (bound.joint)
-      B.row(row).head(motion_count_) = bound.sign * motions_.row(bound.index);
+      B.row(row).head(motion_count_) = bound.sign * motions_.row(bound.tangent);
     else
-      B(row, motion_count_ + object_v_size_ + bound.index) = bound.sign;
+      B(row, motion_count_ + object_v_size_ + bound.tangent) = bound.sign;
   }
-  // From here a joint's bound reads q, which equals its place among the velocities only in a Euclidean hand.
-  for (Bound& bound : bounds_)
-    if (bound.joint)
-      for (const JointInfo& joint : model_->hand_joints())
-        if (joint.v_index == bound.index && joint.v_size == 1) {
-          bound.index = joint.q_index;
-          break;
-        }
   set_bound_normals(B);
 }
 
@@ -122,7 +114,7 @@ void GraspSystem::add_joint_bounds(const std::vector<double>& lower, const std::
     if (!(low <= high))
       throw Error("joint '" + joint.name + "' has limits [" + std::to_string(low) + ", " + std::to_string(high) + "]");
     const auto add = [&](double sign, double limit, const char* side) {
-      bounds_.push_back({true, joint.v_index, sign, limit, 1.0});
+      bounds_.push_back({joint.q_index, joint.v_index, true, sign, limit, 1.0});
       bound_names_.push_back(std::string(side) + " limit of joint '" + joint.name + "'");
     };
     // A joint that no kept motion moves stays where x1 has it.
@@ -139,7 +131,7 @@ void GraspSystem::add_parameter_bounds() {
     const double scale = parameters_[i].angle ? 1.0 : length_scale_;
     const auto add = [&](double sign, double limit, const char* side) {
       if (!std::isfinite(limit)) return;
-      bounds_.push_back({false, static_cast<int>(i), sign, limit, scale});
+      bounds_.push_back({model_->q_size() + static_cast<int>(i), static_cast<int>(i), false, sign, limit, scale});
       bound_names_.push_back(std::string(side) + " end of patch parameter " + std::to_string(i));
     };
     add(1.0, parameter.upper, "upper");
@@ -336,10 +328,7 @@ void GraspSystem::embed(const double* x, double* out) const {
 }
 
 void GraspSystem::slack(const double* x, double* out) const {
-  for (const Bound& bound : bounds_) {
-    const double value = bound.joint ? x[bound.index] : x[model_->q_size() + bound.index];
-    *out++ = (bound.limit - bound.sign * value) / bound.scale;
-  }
+  for (const Bound& bound : bounds_) *out++ = (bound.limit - bound.sign * x[bound.at]) / bound.scale;
 }
 
 void GraspSystem::contact_points(const double* x, ContactPoint* out) {

@@ -39,12 +39,11 @@ struct ContactPoint {
 
 /// The relevant grasps R (Sections II and III): contacts, hand motions, joint limits and patch intervals.
 ///
-/// A point is x = [q, w]: Pinocchio's configuration of hand and object, then the free patch parameters,
-/// contact by contact, hand before object, u before v. A tangent vector is [y, object, w]: y are velocities
-/// along the hand motions that are kept, so that eq (13), E_s' (q_hand - q_hand,1) = 0, holds by
-/// construction; lengths are divided by `length_scale`. Equations: for each contact three for the points
-/// (divided by length_scale) and two for the normals; in
-/// the plane two and one.
+/// A point is x = [q, w]: Pinocchio's configuration of hand and object, then the free patch parameters, contact by
+/// contact, hand before object, u before v. A tangent vector is [y, object, w]: y are velocities along the hand motions
+/// that are kept, so that eq (13), E_s' (q_hand - q_hand,1) = 0, holds by construction; lengths are divided by
+/// `length_scale`. Equations: for each contact three for the points (divided by length_scale) and two for the normals;
+/// in the plane two and one.
 class GraspSystem : public System {
  public:
   /// Columns of `motions` [hand_v_size x p] are the joint velocities of the hand motions kept, each of length one in
@@ -77,8 +76,9 @@ class GraspSystem : public System {
 
  private:
   struct Bound {
-    bool joint;  // else a patch parameter
-    int index;   // in q, or in w
+    int at;       // its number in x
+    int tangent;  // the joint's number among the velocities, or the parameter's in w
+    bool joint;   // else a patch parameter
     double sign, limit, scale;
   };
   struct FreeParameter {
