@@ -13,7 +13,7 @@ from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.quality import batched
 from graspatlas.result import Result, load_result
 from graspatlas.systems import System
-from graspatlas.viewer import export_html, view
+from graspatlas.viewer import export_html, save_picture, view
 
 __version__ = "0.1.0"
 
@@ -42,6 +42,7 @@ __all__ = [
     "optimize",
     "patches",
     "quality",
+    "save_picture",
     "systems",
     "view",
 ]

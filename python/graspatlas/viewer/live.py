@@ -1,0 +1,79 @@
+"""The scene in a browser, served by meshcat."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import sys
+import time
+import warnings
+from typing import TYPE_CHECKING, Any
+
+from graspatlas.errors import GraspAtlasError
+from graspatlas.result import Result
+from graspatlas.viewer.page import commands
+from graspatlas.viewer.scene import Scene
+
+if TYPE_CHECKING:
+    import meshcat
+
+__all__ = ["close", "show"]
+
+
+def show(result: Result, *, open_browser: bool, wait: bool) -> meshcat.Visualizer:
+    """Serve a result's scene; see :func:`graspatlas.viewer.view`."""
+    scene = Scene(result)
+    visualizer = _start()
+    try:
+        for command in commands(scene, with_legend=True):
+            visualizer.window.send(_Command(command))
+        print(f"{result.problem.name} at {visualizer.url()}", file=sys.stderr)
+        if open_browser:
+            visualizer.open()
+        if wait:
+            print("press Ctrl-C to end", file=sys.stderr)
+            _serve(visualizer)
+    except KeyboardInterrupt:
+        close(visualizer)
+    return visualizer
+
+
+def close(visualizer: meshcat.Visualizer) -> None:
+    """End the server of a visualizer, and what listens to it."""
+    window = visualizer.window
+    window.zmq_socket.close(linger=0)
+    process = window.server_proc
+    process.terminate()
+    process.wait()
+    process.stdout.close()
+    process.stderr.close()
+
+
+class _Command:
+    """A command as meshcat's window sends it."""
+
+    def __init__(self, content: dict[str, Any]) -> None:
+        self._content = content
+
+    def lower(self) -> dict[str, Any]:
+        return self._content
+
+
+def _start() -> meshcat.Visualizer:
+    with warnings.catch_warnings():  # meshcat imports a deprecated part of pyzmq
+        warnings.simplefilter("ignore", DeprecationWarning)
+        import meshcat
+
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            return meshcat.Visualizer()
+    except (RuntimeError, OSError) as error:
+        raise GraspAtlasError(
+            f"meshcat's server does not start: {error}; export_html writes a page that needs no server"
+        ) from None
+
+
+def _serve(visualizer: meshcat.Visualizer) -> None:
+    while visualizer.window.server_proc.poll() is None:
+        time.sleep(0.2)
+    close(visualizer)

@@ -1,0 +1,173 @@
+"""The scene as commands of the meshcat viewer, and as one page that needs neither server nor network."""
+
+from __future__ import annotations
+
+import base64
+import html
+import importlib.util
+import io
+from collections.abc import Iterator
+from importlib import resources
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from graspatlas.errors import GraspAtlasError
+from graspatlas.viewer.camera import Camera
+from graspatlas.viewer.lettering import caption_image, legend_image
+from graspatlas.viewer.scene import SHOW_THROUGH, Scene
+from graspatlas.viewer.shading import FloorShadow
+from graspatlas.viewer.three import ground, group, light, mesh, perspective_camera, sprite
+from graspatlas.viewer.words import caption, index_name, legend, subtitle
+
+__all__ = ["commands", "page"]
+
+Array = NDArray[np.float64]
+Command = dict[str, Any]
+
+#: Path of the scene in meshcat's tree.
+ROOT = "/graspatlas"
+#: Width over height for which the camera is placed, and where the grasps are then: left, right, bottom, top.
+ASPECT = 1.6
+WINDOW = (-0.88, 0.88, -0.56, 0.90)
+#: Colours of the background at the top and at the bottom.
+BACKGROUND = ((0.97, 0.975, 0.98), (0.84, 0.855, 0.875))
+#: Lamps about the camera (right, up, backwards) and their intensity; the first one throws shadows.
+LAMPS = (((-0.55, 0.9, 0.75), 0.62), ((0.9, 0.15, 0.6), 0.22), ((0.35, 0.75, -0.75), 0.20))
+#: Screen colours are darker than light for the same shadow.
+FLOOR_DARKNESS = 0.6
+#: What shows through is drawn over the visible part too, so it is fainter here than in the picture.
+THROUGH = 0.6
+#: Height of letters in the images that captions are made of [pixels].
+LETTERS = 72.0
+#: Width of a caption compared with the distance between the grasps, and its height with that of the page.
+CAPTION_WIDTH, CAPTION_HEIGHT = 0.9, 0.115
+
+
+def page(scene: Scene) -> str:
+    """The page's text."""
+    import umsgpack
+
+    data = [base64.b64encode(umsgpack.packb(command)).decode("ascii") for command in commands(scene)]
+    template = Template((resources.files("graspatlas.viewer") / "page.html").read_text(encoding="utf-8"))
+    return template.substitute(
+        title=html.escape(f"graspatlas: {scene.result.problem.name}"),
+        legend=_legend_html(scene),
+        meshcat=_meshcat_script(),
+        commands=",\n".join(f'"{line}"' for line in data),
+        aspect=ASPECT,
+    )
+
+
+def _meshcat_script() -> str:
+    """Text of meshcat's viewer; found without importing meshcat, which would load its server."""
+    spec = importlib.util.find_spec("meshcat")
+    for folder in (spec.submodule_search_locations or []) if spec else []:
+        script = Path(folder) / "viewer" / "dist" / "main.min.js"
+        if script.is_file():
+            return script.read_text(encoding="utf-8")
+    raise GraspAtlasError("meshcat's viewer is not installed; install it with 'pip install meshcat'")
+
+
+def _legend_html(scene: Scene) -> str:
+    """The page's foot: problem, status, values, colours."""
+    name, rest = subtitle(scene.result).split(": ", 1)
+    values = ", ".join(f"{e.name} {e.grasp.quality:.3g} (chart {e.grasp.chart})" for e in scene.exhibits)
+    values = f"{index_name(scene.result)}: {values}"
+    rows = [f"<b>{html.escape(name)}</b>", *(f"<span>{html.escape(text)}</span>" for text in (rest, values))]
+    for colour, text in legend():
+        css = ", ".join(str(round(255.0 * c)) for c in colour[:3])
+        dot = f'<i style="background: rgba({css}, {1.0 if colour[3] >= 1.0 else 0.6})"></i>'
+        rows.append(f"<span>{dot}{html.escape(text)}</span>")
+    return "\n".join(rows)
+
+
+def commands(scene: Scene, *, with_legend: bool = False) -> Iterator[Command]:
+    """Commands that make meshcat show a scene.
+
+    Args:
+        scene: The scene.
+        with_legend: Whether the colours are explained below the captions.
+    """
+    camera = scene.camera(ASPECT, WINDOW)
+    yield from _studio(camera)
+    centred = np.eye(4)
+    centred[:3, 3] = -camera.target
+    yield {"type": "set_transform", "path": ROOT, "matrix": centred.T.ravel().tolist()}
+    for exhibit in scene.exhibits:
+        for name in ("hand", "object", "contact", "normal", "ellipsoid"):
+            parts = [part for part in exhibit.parts if part.group == name]
+            members = [mesh(part.mesh, part.T, part.colour) for part in parts]
+            if name in SHOW_THROUGH:
+                through = THROUGH * SHOW_THROUGH[name]
+                members += [mesh(part.mesh, part.T, part.colour, through=through) for part in parts]
+            if members:
+                yield _object(f"{ROOT}/{exhibit.name}/{name}", group(members))
+    yield _object(f"{ROOT}/floor", _floor(scene))
+    yield from _captions(scene, camera, with_legend)
+
+
+def _object(path: str, content: dict[str, Any]) -> Command:
+    return {"type": "set_object", "path": path, "object": content}
+
+
+def _property(path: str, name: str, value: Any) -> Command:
+    return {"type": "set_property", "path": path, "property": name, "value": value}
+
+
+def _studio(camera: Camera) -> Iterator[Command]:
+    """Background, lamps and camera."""
+    for path in ("Grid", "Axes", "Lights/SpotLight", "Lights/PointLightNegativeX", "Lights/PointLightPositiveX"):
+        yield _property(f"/{path}", "visible", False)
+    yield _property("/Lights/FillLight", "visible", False)
+    yield _property("/Lights/AmbientLight/<object>", "intensity", 0.42)
+    for name, colour in zip(("top_color", "bottom_color"), BACKGROUND, strict=True):
+        yield _property("/Background", name, list(colour))
+    for i, (place, intensity) in enumerate(LAMPS):
+        path = f"/Lights/lamp_{i}"
+        yield _object(path, light(np.asarray(place) @ camera.axes, intensity))
+        yield _property(f"{path}/<object>", "castShadow", i == 0)
+    x, y, z = (float(c) for c in camera.distance * camera.direction)
+    yield _object("/Cameras/default/rotated", perspective_camera(camera.field_of_view))
+    yield _property("/Cameras/default/rotated/<object>", "position", [x, z, -y])
+
+
+def _floor(scene: Scene) -> dict[str, Any]:
+    """The shadow on the floor, as a see-through picture."""
+    bodies = [p for exhibit in scene.exhibits for p in exhibit.parts if p.group in ("hand", "object")]
+    placed = [part.mesh.moved(part.T) for part in bodies]
+    floor = FloorShadow(np.concatenate([shape.vertices[shape.faces] for shape in placed]))
+    pixels = np.zeros((*floor.dark.shape, 4), np.uint8)
+    pixels[..., 3] = np.round(255.0 * np.clip(FLOOR_DARKNESS * floor.dark, 0.0, 1.0))
+    return ground(_png(Image.fromarray(pixels)), *floor.corners)
+
+
+def _captions(scene: Scene, camera: Camera, with_legend: bool) -> Iterator[Command]:
+    """Captions below the grasps, and the legend below those; they turn with the camera and stay readable."""
+    half = camera.distance * np.tan(camera.field_of_view / 2.0) * np.array([ASPECT, 1.0])
+    seen = [camera.project(exhibit.points, ASPECT)[:, :2] * half for exhibit in scene.exhibits]
+    middles = [float(points[:, 0].min() + points[:, 0].max()) / 2.0 for points in seen]
+    bottom = min(float(points[:, 1].min()) for points in seen)
+    images = [caption_image(caption(scene.result, exhibit), LETTERS) for exhibit in scene.exhibits]
+    widest = CAPTION_WIDTH * (middles[1] - middles[0])
+    visible = 2.0 * camera.distance * np.tan(camera.field_of_view / 2.0)
+    pixel = min(widest / max(image.width for image in images), CAPTION_HEIGHT * visible / images[0].height)
+    height = pixel * images[0].height
+    for exhibit, middle, image in zip(scene.exhibits, middles, images, strict=True):
+        place = camera.target + np.array([middle, bottom - 0.65 * height]) @ camera.axes[:2]
+        yield _object(f"{ROOT}/{exhibit.name}/caption", sprite(_png(image), place, pixel * image.width, height))
+    if with_legend:
+        image = legend_image(legend(), 0.5 * LETTERS)
+        middle = (middles[0] + middles[1]) / 2.0
+        place = camera.target + np.array([middle, bottom - 1.4 * height]) @ camera.axes[:2]
+        yield _object(f"{ROOT}/legend", sprite(_png(image), place, pixel * image.width, pixel * image.height))
+
+
+def _png(image: Image.Image) -> bytes:
+    stream = io.BytesIO()
+    image.save(stream, "PNG")
+    return stream.getvalue()

@@ -1,0 +1,58 @@
+"""What is written beside the grasps: the same words in the picture, in the page and in the live view."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from graspatlas.quality import INDICES, quality_name
+from graspatlas.result import Result
+from graspatlas.viewer.scene import COLOURS, Colour, Exhibit
+
+__all__ = ["Caption", "caption", "index_name", "legend", "subtitle"]
+
+
+@dataclass(frozen=True)
+class Caption:
+    """What is written beside one grasp.
+
+    Attributes:
+        title: Such as ``Best grasp``.
+        quality: The quality index in words, and its value.
+        motion: How far the object moves when the joints turn by one radian (root of the sum of squares): semi-axes.
+    """
+
+    title: str
+    quality: str
+    motion: str
+
+
+def caption(result: Result, exhibit: Exhibit) -> Caption:
+    """What is written beside one of the grasps."""
+    reach = ", ".join(f"{1000.0 * axis:.3g}" for axis in exhibit.semi_axes[: 3 if len(exhibit.grasp.G) == 6 else 2])
+    return Caption(
+        title=f"{exhibit.name.capitalize()} grasp",
+        quality=f"{index_name(result)} {exhibit.grasp.quality:.3g}",
+        motion=f"object moves {reach} mm per rad",
+    )
+
+
+def index_name(result: Result) -> str:
+    """Name of the quality index, in words."""
+    return quality_name(result.quality).replace("_", " ")
+
+
+def subtitle(result: Result) -> str:
+    """The problem, the size of its atlas, whether that is complete, and the unit."""
+    name = quality_name(result.quality)
+    known = name in INDICES and result.quality in (name, INDICES[name])
+    unit = "; lengths in mm" if known else ""
+    return f"{result.problem.name}: atlas of {result.atlas.n_charts} charts, {result.status}{unit}"
+
+
+def legend() -> list[tuple[Colour, str]]:
+    """Colours and what they stand for."""
+    return [
+        (COLOURS["contact"], "contact point"),
+        (COLOURS["normal"], "normal, out of the object"),
+        (COLOURS["ellipsoid"], "velocities that the joints give the object, not to a common scale"),
+    ]
