@@ -7,7 +7,7 @@ SOURCES := pyproject.toml CMakeLists.txt $(shell find cpp python robots -type f 
 .PHONY: demo test bench lint stubs format clean
 
 demo: $(VENV)/.installed
-	$(BIN)/graspatlas optimize schunk_can --output out/schunk_can
+	$(BIN)/graspatlas optimize schunk_can --require force_closure --require collision_free --output out/schunk_can
 	$(BIN)/graspatlas view out/schunk_can --picture out/schunk_can/grasps.png --html out/schunk_can/grasps.html
 	@echo "Open out/schunk_can/grasps.html in a browser, or run: $(BIN)/graspatlas view out/schunk_can"
 

@@ -11,6 +11,7 @@ from graspatlas.optimizer import build_atlas, optimize
 from graspatlas.problem import Problem
 from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.quality import batched
+from graspatlas.requirements import CollisionFree, ForceClosure, JointMargin
 from graspatlas.result import Result, load_result
 from graspatlas.systems import System
 from graspatlas.viewer import export_html, save_picture, view
@@ -21,13 +22,16 @@ __all__ = [
     "Atlas",
     "Body",
     "Closed",
+    "CollisionFree",
     "Contact",
     "FirstGrasp",
+    "ForceClosure",
     "Grasp",
     "GraspAtlasError",
     "Grasps",
     "Hand",
     "HandMotions",
+    "JointMargin",
     "Problem",
     "Result",
     "Status",

@@ -27,6 +27,7 @@ __all__: list[str] = [
     "Rotations",
     "Sphere",
     "Torus",
+    "force_closure_margins",
     "project",
     "semi_axes",
 ]
@@ -416,6 +417,15 @@ class GraspSystem(AnySystem):
         """
         Degrees of freedom of the object.
         """
+
+def force_closure_margins(
+    system: GraspSystem,
+    X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    friction: typing.SupportsFloat | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Force-closure margin of each grasp [n]; zero where a grasp is not force-closed. See force_closure.hpp.
+    """
 
 def project(
     system: AnySystem,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from graspatlas.atlas import Atlas, Closed
 from graspatlas.grasps import Grasps
 from graspatlas.quality import INDICES, evaluate
+from graspatlas.requirements import requirement_name, screen
 from graspatlas.systems import AnySystem
 
 if TYPE_CHECKING:
@@ -184,5 +185,11 @@ def _result_checks(result: Result) -> Iterator[Check]:
         scale = np.maximum(np.abs(again), 1e-12)
         error = float((np.abs(again - result.qualities) / scale).max())
         yield Check("qualities differ from a new evaluation by, relatively", error, 1e-6)
-    gap = float(result.qualities.max() - result.best.quality)
-    yield Check("a chart is better than the best grasp by", gap, 0.0)
+    if result.feasible.any():
+        gap = float(result.qualities[result.feasible].max() - result.best.quality)
+        yield Check("a chart that meets the requirements is better than the best grasp by", gap, 0.0)
+        winner = Grasps(problem, result.best.x, system)
+        for requirement in result.requirements:
+            if not isinstance(requirement, str):
+                met, _ = screen([requirement], winner)
+                yield Check(f"the best grasp fails requirement {requirement_name(requirement)}", float(not met[0]), 0.0)

@@ -17,7 +17,8 @@ from graspatlas.atlas import Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.optimizer import optimize
 from graspatlas.problems import bundled_problems, load_problem
-from graspatlas.quality import INDICES
+from graspatlas.quality import INDICES, quality_name
+from graspatlas.requirements import parse_requirement
 from graspatlas.result import Result, load_result, writable_folder
 
 __all__ = ["main"]
@@ -76,6 +77,14 @@ def _parser() -> argparse.ArgumentParser:
         help="how different neighbouring charts may be, 0 to 1",
     )
     best.add_argument("--quality", metavar="NAME", help=f"quality index: {', '.join(INDICES)}")
+    best.add_argument(
+        "--require",
+        action="append",
+        default=[],
+        metavar="NAME[:VALUE...]",
+        help="requirement that the best grasp must meet, such as collision_free, force_closure:0.5:0.02 (friction, "
+        "margin) or joint_margin:0.05; may be given several times",
+    )
     best.add_argument("--max-charts", type=int, metavar="N", help="cut the atlas short after N charts")
     best.add_argument("--max-seconds", type=float, metavar="S", help="cut the atlas short after S seconds")
     best.add_argument("--output", type=Path, metavar="FOLDER", help="write result.npz and summary.json there")
@@ -104,6 +113,7 @@ def _list(_: argparse.Namespace) -> int:
 
 def _optimize(options: argparse.Namespace) -> int:
     problem = load_problem(options.problem)
+    require = [parse_requirement(text) for text in options.require]
     folder = writable_folder(options.output) if options.output else None
     result = optimize(
         problem,
@@ -111,6 +121,7 @@ def _optimize(options: argparse.Namespace) -> int:
         radius=options.radius,
         epsilon=options.epsilon,
         quality=options.quality,
+        require=require,
         max_charts=options.max_charts,
         max_seconds=options.max_seconds,
         progress=True,
@@ -131,28 +142,32 @@ def _write_summary(result: Result, path: Path) -> None:
 
 def _report(result: Result, folder: Path | None) -> str:
     summary = result.summary()
-    seconds, quality, best = summary["seconds"], summary["quality"], result.best
+    seconds = summary["seconds"]
     closed = {reason: count for reason, count in result.atlas.closed_vertices.items() if count}
-    angles = "\n".join(f"    {name:20} {value:9.4f}" for name, value in best.joint_positions.items())
     lines = [
         f"{summary['problem']}: {summary['n_charts']} charts of dimension {summary['dimension']} in "
         f"{seconds['atlas']:.3f} s, index in {seconds['quality']:.3f} s; {summary['status']}",
-        f"  {quality['name']}: best {quality['best']:.6g}, worst {quality['worst']:.6g}, "
-        f"first grasp {quality['at_x1']:.6g}",
         f"  largest residual {summary['max_residual']:.1e}",
     ]
     if closed:
         lines.append(f"  vertices that no step could leave: {closed}")
-    lines += [
-        f"  best grasp (chart {best.chart}): object at {_row(best.object_xyz)} m, "
-        f"quaternion xyzw {_row(best.object_quat_xyzw)}, joints [rad]:",
-        angles,
-    ]
+    if result.requirements:
+        counts = ", ".join(f"{name} refused {count}" for name, count in result.refused.items())
+        lines.append(f"  {result.feasible.sum()} grasps meet the requirements; {counts}")
+    lines += _best_lines(result) if result.feasible.any() else ["  no best grasp: relax a requirement"]
     if not result.is_global:
         lines.append("  the atlas does not cover all grasps: better ones may exist")
     if folder:
         lines.append(f"  written to {folder}; look at it with: graspatlas view {folder}")
     return "\n".join(lines)
+
+
+def _best_lines(result: Result) -> list[str]:
+    best, name = result.best, quality_name(result.quality)
+    values = f"best {best.quality:.6g}, worst {result.worst.quality:.6g}, first grasp {result.at_x1.quality:.6g}"
+    pose = f"object at {_row(best.object_xyz)} m, quaternion xyzw {_row(best.object_quat_xyzw)}"
+    angles = [f"    {joint:20} {value:9.4f}" for joint, value in best.joint_positions.items()]
+    return [f"  {name}: {values}", f"  best grasp (chart {best.chart}): {pose}, joints [rad or m]:", *angles]
 
 
 def _row(values: NDArray[np.float64]) -> str:

@@ -184,8 +184,8 @@ class Hand(Body):
         """The hand alone, as a kinematic tree."""
         if "<mimic" in self.urdf:
             raise GraspAtlasError(
-                f"hand '{self.name}' has a joint that mimics another; coupled joints are not supported: drop the joint's "
-                "<mimic> and state the coupling by the hand motions"
+                f"hand '{self.name}' has a joint that mimics another; coupled joints are not supported: drop "
+                "the joint's <mimic> and state the coupling by the hand motions"
             )
         try:
             return _core.Model(self.urdf, "none")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Sequence
 from numbers import Integral, Real
 from typing import Any
 
@@ -17,6 +18,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasps
 from graspatlas.problem import Problem
 from graspatlas.quality import Quality, evaluate, find_index
+from graspatlas.requirements import Require, screen
 from graspatlas.result import Result
 from graspatlas.systems import AnySystem
 
@@ -114,6 +116,7 @@ def optimize(
     radius: float | None = None,
     epsilon: float | None = None,
     quality: Quality | None = None,
+    require: Sequence[Require] = (),
     max_charts: int | None = None,
     max_seconds: float | None = None,
     progress: bool | None = None,
@@ -128,13 +131,14 @@ def optimize(
         radius: r, of a chart [rad, and lengths in units of ``problem.length_scale``].
         epsilon: See :func:`build_atlas`.
         quality: Name of an index, or a callable: see :mod:`graspatlas.quality`.
+        require: What a grasp must meet to be the best or the worst: see :mod:`graspatlas.requirements`.
         max_charts: See :func:`build_atlas`.
         max_seconds: See :func:`build_atlas`.
         progress: See :func:`build_atlas`.
 
     Returns:
-        The result: best and worst grasp, atlas, qualities and status. The best grasp is the best of all grasps that are
-        connected to x1, up to the size of a chart, only when ``result.status`` is ``Status.COMPLETE``.
+        The result: best and worst grasp, atlas, qualities and status. Only when ``result.is_global`` the best grasp is
+        the best of all that are connected to x1 and meet the requirements, up to the size of a chart.
 
     Raises:
         GraspAtlasError: If an argument makes no sense, or the index fails.
@@ -157,13 +161,18 @@ def optimize(
         progress=progress,
     )
     start = time.perf_counter()
-    qualities = evaluate(options["quality"], Grasps(problem, atlas.centers, system))
+    grasps = Grasps(problem, atlas.centers, system)
+    feasible, refused = screen(require, grasps)
+    qualities = evaluate(options["quality"], grasps)
     return Result(
         problem=problem,
         atlas=atlas,
         quality=options["quality"],
         qualities=qualities,
         quality_seconds=time.perf_counter() - start,
+        requirements=tuple(require),
+        feasible=feasible,
+        refused=refused,
     )
 
 

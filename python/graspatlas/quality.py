@@ -30,6 +30,7 @@ __all__ = [
     "Quality",
     "batched",
     "evaluate",
+    "force_closure_margin",
     "inverse_condition_number",
     "manipulability_volume",
     "quality_name",
@@ -112,9 +113,31 @@ def smallest_semi_axis(grasps: Grasps, length_unit: float = Grasps.LENGTH_UNIT) 
     return axes[:, 0].copy() if axes.shape[1] else np.zeros(len(grasps))
 
 
+@batched
+def force_closure_margin(grasps: Grasps, friction: float = 0.5) -> Array:
+    r"""Distance of the contact forces from their friction cones that internal forces allow; 0 without force closure.
+
+    .. math:: \max_{G f = 0,\; \sum_i n_i^\top f_i = 1} \; \min_i \;
+        \frac{\mu \, n_i^\top f_i - \| f_i - n_i n_i^\top f_i \|}{\sqrt{1 + \mu^2}}
+
+    The margin has no unit: normal forces add up to one. It is exact for round cones (a second-order cone programme).
+
+    Args:
+        grasps: The grasps.
+        friction: Coefficient of friction mu.
+
+    Returns:
+        One value for each grasp [n].
+
+    Source: Force closure as in V.-D. Nguyen, "Constructing Force-Closure Grasps", IJRR 1988, the paper's reference 14.
+    """
+    return np.asarray(_core.force_closure_margins(grasps.system, grasps.x, friction))
+
+
 #: Indices by name.
 INDICES: dict[str, Callable[[Grasps], Array]] = {
-    index.__name__: index for index in (inverse_condition_number, manipulability_volume, smallest_semi_axis)
+    index.__name__: index
+    for index in (inverse_condition_number, manipulability_volume, smallest_semi_axis, force_closure_margin)
 }
 
 

@@ -21,6 +21,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasp, Grasps
 from graspatlas.problem import Problem
 from graspatlas.quality import Quality, quality_name
+from graspatlas.requirements import Require, parse_requirement, requirement_name
 
 __all__ = ["Result", "load_result", "writable_folder"]
 
@@ -39,14 +40,20 @@ class Result:
         atlas: Atlas of the relevant grasps.
         quality: The index: its name, or the callable.
         qualities: Its value at each chart centre [n].
-        quality_seconds: Time that its evaluation took.
+        quality_seconds: Time that its evaluation and that of the requirements took.
+        requirements: What a grasp must meet to be the best or the worst; names where a callable was not stored.
+        feasible: Which charts meet the requirements [n].
+        refused: How many charts each requirement refused, of those that the ones before it had left.
     """
 
     problem: Problem
     atlas: Atlas
     quality: Quality
     qualities: Array
-    quality_seconds: float = 0.0
+    quality_seconds: float
+    requirements: tuple[Require | str, ...]
+    feasible: NDArray[np.bool_]
+    refused: Mapping[str, int]
 
     @property
     def status(self) -> Status:
@@ -60,7 +67,7 @@ class Result:
 
     @property
     def is_global(self) -> bool:
-        """True when the best grasp is the best of all that are connected to x1, up to the size of a chart.
+        """True when the best is the best of all grasps connected to x1 that meet the requirements, up to a chart.
 
         The atlas must be complete, and no vertex closed for want of convergence or for curvature.
         """
@@ -69,13 +76,27 @@ class Result:
 
     @cached_property
     def best(self) -> Grasp:
-        """Grasp with the largest quality; the first of equals."""
-        return self.grasp(int(np.argmax(self.qualities)))
+        """Grasp with the largest quality of those that meet the requirements; the first of equals.
+
+        Raises:
+            GraspAtlasError: If no grasp meets them.
+        """
+        return self.grasp(int(np.argmax(np.where(self._some_feasible(), self.qualities, -np.inf))))
 
     @cached_property
     def worst(self) -> Grasp:
-        """Grasp with the smallest quality; the first of equals."""
-        return self.grasp(int(np.argmin(self.qualities)))
+        """Grasp with the smallest quality of those that meet the requirements; the first of equals.
+
+        Raises:
+            GraspAtlasError: If no grasp meets them.
+        """
+        return self.grasp(int(np.argmin(np.where(self._some_feasible(), self.qualities, np.inf))))
+
+    def _some_feasible(self) -> NDArray[np.bool_]:
+        if not self.feasible.any():
+            counts = ", ".join(f"{name} refused {count}" for name, count in self.refused.items())
+            raise GraspAtlasError(f"none of {self.atlas.n_charts} grasps meets the requirements ({counts}): relax one")
+        return self.feasible
 
     @property
     def at_x1(self) -> Grasp:
@@ -98,8 +119,9 @@ class Result:
         return check_result(self)
 
     def summary(self) -> dict[str, Any]:
-        """The result in plain data, as the command line prints it."""
-        atlas, best = self.atlas, self.best
+        """The result in plain data, as the command line prints it; best is None where no grasp meets requirements."""
+        atlas = self.atlas
+        best, worst = (self.best, self.worst) if self.feasible.any() else (None, None)
         return {
             "problem": self.problem.name,
             "dimension": self.dimension,
@@ -112,11 +134,12 @@ class Result:
             "max_residual": float(atlas.residuals.max()),
             "quality": {
                 "name": quality_name(self.quality),
-                "best": best.quality,
-                "worst": self.worst.quality,
+                "best": best and best.quality,
+                "worst": worst and worst.quality,
                 "at_x1": float(self.qualities[0]),
             },
-            "best": {
+            "best": best
+            and {
                 "q": best.q.tolist(),
                 "object_xyz": best.object_xyz.tolist(),
                 "object_quat_xyzw": best.object_quat_xyzw.tolist(),
@@ -145,6 +168,8 @@ class Result:
             "seconds": self.atlas.seconds,
             "quality": quality_name(self.quality),
             "quality_seconds": self.quality_seconds,
+            "requirements": [requirement_name(r) for r in self.requirements],
+            "refused": dict(self.refused),
         }
         temporary = None
         try:
@@ -154,6 +179,7 @@ class Result:
                     stream,
                     header=json.dumps(header),
                     qualities=self.qualities,
+                    feasible=self.feasible,
                     **self.atlas.to_arrays(),
                 )
             os.chmod(temporary, 0o644)
@@ -198,7 +224,7 @@ def load_result(path: str | os.PathLike[str]) -> Result:
 def _from_parts(header: Mapping[str, Any], arrays: dict[str, Any], source: Path) -> Result:
     try:
         problem = Problem.from_dict(header["problem"])
-        qualities = arrays.pop("qualities")
+        qualities, feasible = arrays.pop("qualities"), arrays.pop("feasible")
         atlas = Atlas(
             system=problem.system(header["dimension"]),
             radius=header["radius"],
@@ -207,9 +233,26 @@ def _from_parts(header: Mapping[str, Any], arrays: dict[str, Any], source: Path)
             seconds=header["seconds"],
             **arrays,
         )
-        return Result(problem, atlas, header["quality"], qualities, header["quality_seconds"])
+        return Result(
+            problem=problem,
+            atlas=atlas,
+            quality=header["quality"],
+            qualities=qualities,
+            quality_seconds=header["quality_seconds"],
+            requirements=tuple(_stored_requirement(text) for text in header["requirements"]),
+            feasible=feasible,
+            refused=header["refused"],
+        )
     except (KeyError, TypeError) as error:
         raise GraspAtlasError(f"result '{source}' lacks a part ({error}); compute it again") from None
+
+
+def _stored_requirement(text: str) -> Require | str:
+    """The requirement of a name; the name alone of a callable, which is not stored."""
+    try:
+        return parse_requirement(text)
+    except GraspAtlasError:
+        return text
 
 
 def writable_folder(path: str | os.PathLike[str]) -> Path:

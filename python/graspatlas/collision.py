@@ -1,0 +1,129 @@
+"""Collisions of hand and object, by coal through Pinocchio."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graspatlas.errors import GraspAtlasError
+
+if TYPE_CHECKING:
+    from graspatlas.hand import Body
+    from graspatlas.problem import Problem
+
+__all__ = ["CollisionChecker"]
+
+#: Before the names of the object's shapes.
+OBJECT = "object/"
+
+
+class CollisionChecker:
+    """Tells whether a grasp is free of collision: hand with itself, and hand with object.
+
+    Pairs of links that the hand's SRDF lists may touch. The links that carry a contact touch the object; they may sink
+    into it by `touch_depth`, since a collision shape only approximates the surface.
+
+    Args:
+        problem: The problem; hand and object need collision shapes.
+        touch_depth: Depth to which a touching link may sink into the object [m].
+        clearance: Distance that all other pairs must keep [m].
+
+    Raises:
+        GraspAtlasError: If hand or object has no collision shape, or a mesh cannot be read.
+    """
+
+    def __init__(self, problem: Problem, touch_depth: float = 0.002, clearance: float = 0.0) -> None:
+        import coal
+        import pinocchio as pin
+
+        self._pin = pin
+        self._model, self._geometry = _joined(problem)
+        self._data = self._model.createData()
+        self._geometry_data = pin.GeometryData(self._geometry)
+        touching = _touching_joints(self._model, problem)
+        for i, pair in enumerate(self._geometry.collisionPairs):
+            shapes = [self._geometry.geometryObjects[s] for s in (pair.first, pair.second)]
+            in_object = [shape.name.startswith(OBJECT) for shape in shapes]
+            touches = in_object == [False, True] and shapes[0].parentJoint in touching
+            request = coal.CollisionRequest()
+            request.security_margin = -touch_depth if touches else clearance
+            self._geometry_data.collisionRequests[i] = request
+
+    def first_collision(self, x: ArrayLike) -> tuple[str, str] | None:
+        """Names of the first two shapes found in collision at a grasp, or None.
+
+        Args:
+            x: The grasp [configuration_size].
+        """
+        q = np.asarray(x, float)[: self._model.nq]
+        hit = self._pin.computeCollisions(self._model, self._data, self._geometry, self._geometry_data, q, True)
+        if not hit:
+            return None
+        for pair, result in zip(self._geometry.collisionPairs, self._geometry_data.collisionResults, strict=True):
+            if result.isCollision():
+                first, second = (self._geometry.geometryObjects[i].name for i in (pair.first, pair.second))
+                return first, second
+        return None
+
+    def free(self, X: ArrayLike) -> NDArray[np.bool_]:
+        """Whether each grasp is free of collision [n].
+
+        Args:
+            X: One grasp a row [n, configuration_size].
+        """
+        compute = self._pin.computeCollisions
+        model, data, geometry, geometry_data = self._model, self._data, self._geometry, self._geometry_data
+        rows = np.ascontiguousarray(np.asarray(X, float)[:, : model.nq])
+        return np.array([not compute(model, data, geometry, geometry_data, q, True) for q in rows], bool)
+
+
+def _joined(problem: Problem) -> tuple[Any, Any]:
+    """Model and collision geometry of hand and object in one; the object's shapes sit on the joint named object."""
+    import pinocchio as pin
+
+    model = pin.buildModelFromXML(problem.hand.urdf)
+    geometry = _shapes(problem.hand, model)
+    if problem.hand.srdf:
+        geometry.addAllCollisionPairs()
+        pin.removeCollisionPairsFromXML(model, geometry, problem.hand.srdf)
+    else:
+        geometry.addAllCollisionPairs()
+        _drop_adjacent(model, geometry)
+    in_hand = geometry.ngeoms
+    joint = pin.JointModelFreeFlyer() if problem.object_joint == "free_flyer" else pin.JointModelPlanar()
+    object_joint = model.addJoint(0, joint, pin.SE3.Identity(), "object")
+    body = _shapes(problem.object, pin.buildModelFromXML(problem.object.urdf))
+    for shape in body.geometryObjects:
+        placed = pin.GeometryObject(OBJECT + shape.name, object_joint, 0, shape.placement, shape.geometry)
+        index = geometry.addGeometryObject(placed)
+        for other in range(in_hand):
+            geometry.addCollisionPair(pin.CollisionPair(other, index))
+    return model, geometry
+
+
+def _shapes(body: Body, model: Any) -> Any:
+    import pinocchio as pin
+
+    try:
+        geometry = pin.buildGeomFromUrdfString(model, body.urdf, pin.COLLISION, package_dirs=list(body.package_dirs))
+    except (ValueError, RuntimeError) as error:
+        reason = " ".join(str(error).rpartition("message: ")[2].split())
+        raise GraspAtlasError(f"collision shapes of '{body.name}' cannot be read: {reason}") from None
+    if geometry.ngeoms == 0:
+        raise GraspAtlasError(f"'{body.name}' has no collision shape; give its URDF <collision> elements")
+    return geometry
+
+
+def _drop_adjacent(model: Any, geometry: Any) -> None:
+    """Without an SRDF, shapes of one joint and of parent and child joints may touch."""
+    for pair in list(geometry.collisionPairs):
+        a, b = (geometry.geometryObjects[i].parentJoint for i in (pair.first, pair.second))
+        if a == b or model.parents[a] == b or model.parents[b] == a:
+            geometry.removeCollisionPair(pair)
+
+
+def _touching_joints(model: Any, problem: Problem) -> set[int]:
+    """Joints that carry a link with a contact."""
+    return {model.frames[model.getFrameId(contact.frame)].parentJoint for contact in problem.contacts}

@@ -1,0 +1,196 @@
+"""Requirements that a grasp must meet before its quality counts: force closure, no collision, distance from limits.
+
+A requirement is one of the classes below, or any function of a grasp that returns whether it will do; one that takes a
+whole batch of :class:`~graspatlas.grasps.Grasps` and returns an array [n] is marked by :func:`graspatlas.batched`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import astuple, dataclass, fields
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graspatlas import _core
+from graspatlas.collision import CollisionChecker
+from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.grasps import Grasps
+
+__all__ = ["CollisionFree", "ForceClosure", "JointMargin", "Require", "parse_requirement", "requirement_name", "screen"]
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """Base of the requirements that have a name.
+
+    Attributes:
+        cost: The cheaper ones are asked first.
+    """
+
+    name: ClassVar[str] = ""
+    cost: ClassVar[int] = 0
+
+    def met(self, grasps: Grasps) -> Flags:
+        """Whether each grasp meets the requirement [n]."""
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        return ":".join([self.name, *(f"{value:g}" for value in astuple(self))])
+
+    def _check(self, positive: Sequence[str], finite: Sequence[str] = ()) -> None:
+        for attribute in (*positive, *finite):
+            value = getattr(self, attribute)
+            low = 0.0 if attribute in positive else -np.inf
+            if isinstance(value, bool) or not isinstance(value, int | float) or not low < value < np.inf:
+                kind = "positive" if attribute in positive else "finite"
+                raise GraspAtlasError(f"{attribute} of requirement {self.name} must be {kind}, got {value!r}")
+
+
+@dataclass(frozen=True)
+class JointMargin(Requirement):
+    """Every joint stays this far from its limits.
+
+    Attributes:
+        distance: Smallest distance from a limit [rad or m].
+    """
+
+    distance: float = 0.05
+    name: ClassVar[str] = "joint_margin"
+    cost: ClassVar[int] = 0
+
+    def __post_init__(self) -> None:
+        self._check(("distance",))
+
+    def met(self, grasps: Grasps) -> Flags:
+        """Whether each grasp meets the requirement [n]."""
+        lower, upper = grasps.problem.hand.joint_limits
+        return np.asarray(((grasps.q - lower >= self.distance) & (upper - grasps.q >= self.distance)).all(axis=1))
+
+
+@dataclass(frozen=True)
+class ForceClosure(Requirement):
+    """Friction lets the contacts resist any push: internal forces exist strictly inside all friction cones.
+
+    Attributes:
+        friction: Coefficient of friction mu at every contact.
+        margin: Smallest force-closure margin; see :func:`graspatlas.quality.force_closure_margin`. A margin of 0 asks
+            for closure alone.
+    """
+
+    friction: float = 0.5
+    margin: float = 0.0
+    name: ClassVar[str] = "force_closure"
+    cost: ClassVar[int] = 1
+
+    def __post_init__(self) -> None:
+        self._check(("friction",), ("margin",))
+
+    def met(self, grasps: Grasps) -> Flags:
+        """Whether each grasp meets the requirement [n]."""
+        margins = np.asarray(_core.force_closure_margins(grasps.system, grasps.x, self.friction))
+        return np.asarray((margins > 0.0) & (margins >= self.margin))
+
+
+@dataclass(frozen=True)
+class CollisionFree(Requirement):
+    """The hand hits neither itself nor the object, the touching fingertips excepted; by coal.
+
+    Attributes:
+        touch_depth: Depth to which a touching link may sink into the object, since shapes are approximations [m].
+        clearance: Distance that all other pairs of shapes must keep [m].
+    """
+
+    touch_depth: float = 0.002
+    clearance: float = 0.0
+    name: ClassVar[str] = "collision_free"
+    cost: ClassVar[int] = 2
+
+    def __post_init__(self) -> None:
+        self._check((), ("touch_depth", "clearance"))
+
+    def met(self, grasps: Grasps) -> Flags:
+        """Whether each grasp meets the requirement [n]."""
+        return CollisionChecker(grasps.problem, self.touch_depth, self.clearance).free(grasps.x)
+
+
+Require = Requirement | Callable[[Any], Any]
+_NAMED: dict[str, type[Requirement]] = {r.name: r for r in (JointMargin, ForceClosure, CollisionFree)}
+
+
+def requirement_name(requirement: Require | str) -> str:
+    """The requirement as text; :func:`parse_requirement` reads those of the named ones."""
+    if isinstance(requirement, Requirement | str):
+        return str(requirement)
+    return getattr(requirement, "__name__", type(requirement).__name__)
+
+
+def parse_requirement(text: str) -> Requirement:
+    """The requirement that a text such as ``force_closure:0.5:0.02`` names.
+
+    Args:
+        text: A name, then values of its attributes in their order, separated by colons.
+
+    Raises:
+        GraspAtlasError: If there is no such requirement, or a value is no number.
+    """
+    name, *values = text.split(":")
+    if name not in _NAMED:
+        raise unknown_name("requirement", name, _NAMED)
+    attributes = [field.name for field in fields(_NAMED[name])]
+    if len(values) > len(attributes):
+        raise GraspAtlasError(f"requirement {name} has the values {', '.join(attributes)}; got '{text}'")
+    try:
+        return _NAMED[name](*map(float, values))
+    except ValueError as error:
+        if isinstance(error, GraspAtlasError):
+            raise
+        raise GraspAtlasError(f"requirement '{text}' holds a value that is no number") from None
+
+
+def screen(requirements: Sequence[Require], grasps: Grasps) -> tuple[Flags, dict[str, int]]:
+    """Which grasps meet all requirements, the cheapest asked first and only of those that are left.
+
+    Args:
+        requirements: The requirements.
+        grasps: The grasps.
+
+    Returns:
+        Flags [n], and how many grasps each requirement refused.
+
+    Raises:
+        GraspAtlasError: If a predicate raises or returns the wrong shape.
+    """
+    left = np.arange(len(grasps))
+    refused: dict[str, int] = {}
+    for requirement in sorted(requirements, key=lambda r: r.cost if isinstance(r, Requirement) else 1):
+        met = _met(requirement, Grasps(grasps.problem, grasps.x[left], grasps.system))
+        refused[requirement_name(requirement)] = int((~met).sum())
+        left = left[met]
+    flags = np.zeros(len(grasps), bool)
+    flags[left] = True
+    return flags, refused
+
+
+def _met(requirement: Require, grasps: Grasps) -> Flags:
+    if len(grasps) == 0:
+        return np.zeros(0, bool)
+    if isinstance(requirement, Requirement):
+        return requirement.met(grasps)
+    name = requirement_name(requirement)
+    try:
+        if getattr(requirement, "batched", False):
+            met = np.asarray(requirement(grasps))
+        else:
+            met = np.array([bool(requirement(grasp)) for grasp in grasps])
+    except Exception as error:
+        raise GraspAtlasError(f"requirement '{name}' raised {type(error).__name__}: {error}") from error
+    if met.shape != (len(grasps),) or met.dtype != bool:
+        raise GraspAtlasError(
+            f"requirement '{name}' must return {len(grasps)} booleans for {len(grasps)} grasps; "
+            f"it returned an array of shape {met.shape} and type {met.dtype}"
+        )
+    return met

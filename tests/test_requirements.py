@@ -1,0 +1,245 @@
+"""Requirements: force closure against known answers and linear programming, collisions against coal, refusals."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+import graspatlas as ga
+from graspatlas.collision import CollisionChecker
+from graspatlas.requirements import parse_requirement, requirement_name
+
+Array = NDArray[np.float64]
+
+FRICTION = 0.5
+
+
+@pytest.fixture(scope="module")
+def can() -> ga.Result:
+    """The can with an executable best grasp."""
+    require = [ga.ForceClosure(FRICTION, 0.02), ga.CollisionFree()]
+    return ga.optimize(ga.load_problem("schunk_can"), radius=0.25, require=require)
+
+
+def margin_by_linear_programming(grasp: ga.Grasp, friction: float, faces: int = 240) -> float:
+    """The margin with every cone replaced by a pyramid round it: a little larger than the true one."""
+    m = len(grasp.contact_points)
+    rows = []
+    for i, n in enumerate(-grasp.contact_normals):
+        a = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
+        a /= np.linalg.norm(a)
+        b = np.cross(n, a)
+        for angle in np.linspace(0.0, 2.0 * np.pi, faces, endpoint=False):
+            row = np.zeros(3 * m + 1)
+            row[3 * i : 3 * i + 3] = np.cos(angle) * a + np.sin(angle) * b - friction * n
+            row[-1] = np.sqrt(1.0 + friction**2)
+            rows.append(row)
+    equalities = np.zeros((7, 3 * m + 1))
+    equalities[:6, :-1] = grasp.G
+    equalities[6, :-1] = -grasp.contact_normals.ravel()
+    cost = np.r_[np.zeros(3 * m), -1.0]
+    right = np.r_[np.zeros(6), 1.0]
+    free = [(None, None)] * (3 * m + 1)
+    solution = linprog(cost, A_ub=np.array(rows), b_ub=np.zeros(len(rows)), A_eq=equalities, b_eq=right, bounds=free)
+    assert solution.status == 0
+    return float(-solution.fun)
+
+
+def symmetric_planar_problem(turn: float) -> ga.Problem:
+    """Three equal fingers round an object of three equal arcs, turned by an angle [rad] in its middle."""
+    data: dict[str, Any] = json.loads(json.dumps(ga.load_problem("planar_hand").to_dict()))
+    first, second, tip, arc, offset, palm = 0.06, 0.035, 0.035, 0.02, 0.015, 0.1
+    urdf = ['<robot name="three"><link name="palm"/>']
+    joints = {}
+    for i, name in enumerate(("first", "second", "third")):
+        angle = np.pi / 2 + i * 2.0 * np.pi / 3.0
+        anchor = palm * np.array([np.cos(angle), np.sin(angle)])
+        centre = offset * np.array([np.cos(angle + turn), np.sin(angle + turn)])
+        d = centre - anchor
+        reach = second + arc
+        elbow = np.arccos((d @ d - first**2 - reach**2) / (2.0 * first * reach))
+        base = np.arctan2(d[1], d[0]) - np.arctan2(reach * np.sin(elbow), first + reach * np.cos(elbow))
+        joints |= {f"{name}_base": float(base), f"{name}_elbow": float(elbow)}
+        urdf.append(
+            f'<link name="{name}_proximal"/><link name="{name}_distal"/>'
+            f'<joint name="{name}_base" type="continuous"><parent link="palm"/><child link="{name}_proximal"/>'
+            f'<origin xyz="{anchor[0]:.17g} {anchor[1]:.17g} 0"/><axis xyz="0 0 1"/></joint>'
+            f'<joint name="{name}_elbow" type="continuous"><parent link="{name}_proximal"/>'
+            f'<child link="{name}_distal"/><origin xyz="{first} 0 0"/><axis xyz="0 0 1"/></joint>'
+        )
+        contact = data["contacts"][i]
+        contact["hand"]["position"] = [tip, 0.0, 0.0]
+        contact["object"] |= {
+            "radius": arc,
+            "origin": [offset * np.cos(angle), offset * np.sin(angle), 0.0],
+            "u_interval": None,
+        }
+    data["hand"] = {"name": "three", "urdf": "three.urdf", "urdf_text": "".join(urdf) + "</robot>"}
+    quaternion = [0.0, 0.0, float(np.sin(turn / 2)), float(np.cos(turn / 2))]
+    data["x1"] = {"joints": joints, "object_xyz": [0.0, 0.0, 0.0], "object_quat_xyzw": quaternion}
+    return ga.Problem.from_dict(data)
+
+
+@pytest.mark.parametrize("turn", [0.3, 0.45, 0.6, 0.9])
+@pytest.mark.parametrize("friction", [0.2, 0.8, 2.0])
+def test_margin_of_symmetric_three_finger_grasp(turn: float, friction: float) -> None:
+    """By symmetry the forces meet in the centre; the angle to the normals then gives the margin."""
+    problem = symmetric_planar_problem(turn)
+    grasps = ga.Grasps(problem, problem.x1_array)
+    point, normal = grasps.contact_points[0, 0], grasps.contact_normals[0, 0]
+    cosine = point @ normal / np.linalg.norm(point)
+    tangent = np.sqrt(1.0 - cosine**2) / cosine
+    expected = max((friction - tangent) / 3.0 / np.sqrt(1.0 + friction**2), 0.0) if cosine > 0.0 else 0.0
+    assert ga.quality.force_closure_margin(grasps, friction)[0] == pytest.approx(expected, abs=1e-8)
+
+
+def test_margin_agrees_with_linear_programming() -> None:
+    result = ga.optimize(ga.load_problem("schunk_can"), radius=0.25, quality="force_closure_margin")
+    closed = np.flatnonzero(result.qualities > 0.0)
+    assert 0.08 < len(closed) / len(result.qualities) < 0.18
+    rng = np.random.default_rng(3)
+    for chart in rng.choice(closed, 12, replace=False):
+        bound = margin_by_linear_programming(result.grasp(int(chart)), FRICTION)
+        assert result.qualities[chart] <= bound + 1e-8
+        assert result.qualities[chart] == pytest.approx(bound, abs=3e-4)
+    for chart in rng.choice(np.flatnonzero(result.qualities == 0.0), 12, replace=False):
+        assert margin_by_linear_programming(result.grasp(int(chart)), FRICTION) < 1e-3
+
+
+def test_best_grasp_of_the_can_could_be_executed(can: ga.Result) -> None:
+    assert margin_by_linear_programming(can.best, FRICTION) >= 0.02
+    p = can.best.contact_points
+    assert min(np.linalg.norm(p[i] - p[j]) for i, j in [(0, 1), (0, 2), (1, 2)]) > 0.01
+    assert can.best.quality == can.qualities[can.feasible].max()
+    assert can.worst.quality == can.qualities[can.feasible].min()
+    assert can.best.quality < can.qualities.max()
+    assert can.is_global
+
+
+def test_collisions_agree_with_distances_from_coal(can: ga.Result) -> None:
+    problem = can.problem
+    checker = CollisionChecker(problem, touch_depth=0.002)
+    model = pin.buildModelFromXML(problem.hand.urdf)
+    folders = list(problem.hand.package_dirs)
+    shapes = pin.buildGeomFromUrdfString(model, problem.hand.urdf, pin.COLLISION, package_dirs=folders)
+    shapes.addAllCollisionPairs()
+    pin.removeCollisionPairsFromXML(model, shapes, problem.hand.srdf)
+    data, shape_data = model.createData(), pin.GeometryData(shapes)
+    rng = np.random.default_rng(5)
+    clear = hits = 0
+    for chart in rng.choice(can.atlas.n_charts, 60, replace=False):
+        x = can.atlas.centers[chart]
+        pin.computeDistances(model, data, shapes, shape_data, x[: model.nq])
+        nearest = min(result.min_distance for result in shape_data.distanceResults)
+        named = checker.first_collision(x)
+        assert (named is None) == checker.free(x[None])[0]
+        if nearest < -1e-6:
+            assert named is not None
+            hits += 1
+        elif named is not None:
+            assert any(name.startswith("object/") for name in named)
+        else:
+            clear += 1
+    assert clear > 5
+    assert hits > 5
+
+
+def test_refusals_are_counted_cheapest_first() -> None:
+    problem = ga.load_problem("schunk_can")
+    require = [ga.CollisionFree(), ga.ForceClosure(FRICTION), ga.JointMargin(0.05)]
+    result = ga.optimize(problem, radius=0.4, require=require)
+    assert [name.split(":")[0] for name in result.refused] == ["joint_margin", "force_closure", "collision_free"]
+    assert sum(result.refused.values()) + result.feasible.sum() == result.atlas.n_charts
+    lower, upper = problem.hand.joint_limits
+    q = result.best.q
+    assert min((q - lower).min(), (upper - q).min()) >= 0.05
+
+
+def test_no_grasp_meets_the_requirements(capsys: pytest.CaptureFixture[str]) -> None:
+    result = ga.optimize(ga.load_problem("schunk_can"), radius=0.4, require=[ga.ForceClosure(FRICTION, 0.3)])
+    assert not result.feasible.any()
+    with pytest.raises(ga.GraspAtlasError, match=r"force_closure:0.5:0.3 refused \d+"):
+        _ = result.best
+    assert result.check()
+    from graspatlas.cli import main
+
+    assert main(["optimize", "schunk_can", "--radius", "0.4", "--require", "force_closure:0.5:0.3"]) == 0
+    assert "no best grasp" in capsys.readouterr().out
+
+
+def test_predicates_one_by_one_and_in_batch() -> None:
+    problem = ga.load_problem("planar_hand")
+
+    def left(grasp: ga.Grasp) -> bool:
+        return bool(grasp.object_xyz[0] < 0.0)
+
+    @ga.batched
+    def left_of_all(grasps: ga.Grasps) -> Array:
+        return grasps.T_palm_object[:, 0, 3] < 0.0
+
+    one, batch = (ga.optimize(problem, require=[predicate]) for predicate in (left, left_of_all))
+    assert (one.feasible == batch.feasible).all()
+    assert one.best.object_xyz[0] < 0.0
+    assert one.refused == {"left": int((~one.feasible).sum())}
+
+
+@pytest.mark.parametrize(
+    ("predicate", "message"),
+    [
+        (lambda grasp: 1 / 0, "ZeroDivisionError"),
+        (ga.batched(lambda grasps: np.ones((len(grasps), 2), bool)), "booleans"),
+        (ga.batched(lambda grasps: np.ones(len(grasps))), "booleans"),
+    ],
+)
+def test_broken_predicates(predicate: Any, message: str) -> None:
+    with pytest.raises(ga.GraspAtlasError, match=message):
+        ga.optimize(ga.load_problem("planar_hand"), require=[predicate])
+
+
+@pytest.mark.parametrize("text", ["force_closure:0.5:0.02", "collision_free:0.002:0", "joint_margin:0.05"])
+def test_text_of_requirements(text: str) -> None:
+    assert requirement_name(parse_requirement(text)) == text
+    assert parse_requirement(text.split(":")[0]) == type(parse_requirement(text))()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("force_closer", "did you mean 'force_closure'"),
+        ("force_closure:slippery", "no number"),
+        ("force_closure:-1", "friction .* must be positive"),
+        ("force_closure:nan", "friction .* must be positive"),
+        ("force_closure:0.5:inf", "margin .* must be finite"),
+        ("joint_margin:0", "distance .* must be positive"),
+        ("joint_margin:0.1:0.2", "has the values distance"),
+    ],
+)
+def test_wrong_requirements(text: str, message: str) -> None:
+    with pytest.raises(ga.GraspAtlasError, match=message):
+        parse_requirement(text)
+
+
+def test_body_without_collision_shapes() -> None:
+    problem = symmetric_planar_problem(0.3)
+    with pytest.raises(ga.GraspAtlasError, match="'three' has no collision shape"):
+        CollisionChecker(problem)
+
+
+def test_requirements_are_stored_and_verified_again(can: ga.Result, tmp_path: Any) -> None:
+    can.save(tmp_path / "can.npz")
+    loaded = ga.load_result(tmp_path / "can.npz")
+    assert loaded.requirements == can.requirements
+    assert (loaded.feasible == can.feasible).all()
+    assert loaded.best.chart == can.best.chart
+    claims = [check.claim for check in loaded.check().checks]
+    assert "the best grasp fails requirement force_closure:0.5:0.02" in claims
+    assert loaded.check()
+    object.__setattr__(loaded, "feasible", ~can.feasible)
+    del loaded.__dict__["best"]
+    assert not loaded.check()
