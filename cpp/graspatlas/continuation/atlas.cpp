@@ -118,16 +118,21 @@ Closed Atlas::attempt(int i, const double* direction, double alpha) {
   return Closed::open;
 }
 
+// Eqs (17) and (18) between chart i and a chart at x_j, and the images of each centre in the other's tangent space.
+// Eq (17) is a length, which may exceed a chart's own size: then charts on two sides of a fold would cut each other at
+// images far from the middle between them, and leave a gap. So the displacement between the centres, too, may differ
+// from either tangent space by no larger an angle than eq (18) allows between the spaces.
 bool Atlas::pass_tests(int i, const double* x_j, const double* Phi_j, double* p_ij, double* p_ji) {
   system_.difference(center(i), x_j, displacement_.data());
   double squared = 0.0;
   for (int c = 0; c < n_; ++c) squared += displacement_[c] * displacement_[c];
   if (squared > 4.0 * options_.radius * options_.radius) return false;
-  const double limit = options_.epsilon * options_.epsilon;
+  const double cosine = 1.0 - options_.epsilon;
+  const double limit = std::min(options_.epsilon * options_.epsilon, (1.0 - cosine * cosine) * squared);
   if (project_displacement(basis(i), displacement_.data(), k_, n_, p_ij) > limit) return false;
   if (project_displacement(Phi_j, displacement_.data(), k_, n_, p_ji) > limit) return false;
   for (int a = 0; a < k_; ++a) p_ji[a] = -p_ji[a];
-  return tangent_spaces_agree(basis(i), Phi_j, k_, n_, 1.0 - options_.epsilon, work_.data());
+  return tangent_spaces_agree(basis(i), Phi_j, k_, n_, cosine, work_.data());
 }
 
 int Atlas::add_chart() {

@@ -25,10 +25,10 @@ enum class Closed : std::uint8_t { open = 0, bounds = 1, curvature = 2, not_conv
 
 /// An atlas of the connected part of R(x) = 0 that contains a first point: Algorithm 1, lines 4 to 13.
 ///
-/// Invariants, for charts i and j that are neighbours: the displacement between their centres is at most 2 r
-/// long and at most epsilon off either tangent space, the tangent spaces agree to 1 - epsilon, and each
-/// polytope lies in the half-space nearer to its own centre than to the other's, both seen in its own tangent
-/// space.
+/// Invariants, for charts i and j that are neighbours: the displacement between their centres is at most 2 r long; it
+/// is at most epsilon off either tangent space, and its cosine with either is at least 1 - epsilon; the tangent spaces
+/// agree to 1 - epsilon; and each polytope lies in the half-space nearer to its own centre than to the other's, both
+/// seen in its own tangent space.
 class Atlas {
  public:
   /// Starts with one chart at the point of the manifold nearest x0.
