@@ -123,6 +123,9 @@ def _neighbour_checks(atlas: Atlas, system: AnySystem) -> Iterator[Check]:
         float(np.max(off, initial=0.0)),
         atlas.epsilon,
     )
+    lengths = np.maximum(np.linalg.norm(d, axis=1), 1e-300)
+    slant = max(float(1.0 - (np.linalg.norm(p, axis=1) / lengths).min(initial=1.0)) for p in images)
+    yield Check("displacements leave the tangent spaces by 1 - cosine of", slant, atlas.epsilon * (1.0 + 1e-9))
     M = np.einsum("nav,nbv->nab", atlas.bases[i], atlas.bases[j])
     cosines = np.linalg.svd(M, compute_uv=False).min(axis=1, initial=1.0)
     widest = float(1.0 - cosines.min(initial=1.0))
