@@ -32,7 +32,12 @@ def main() -> None:
     report = result.check()
     print(f"verified again from the problem alone: {'passed' if report else 'FAILED'}")
 
-    apart = ga.optimize(problem, quality=spread)
+    # The index alone likes grasps with all fingers on one side of the can. Ask for one that holds.
+    result = ga.optimize(problem, require=[ga.ForceClosure(friction=0.5, margin=0.02), ga.CollisionFree()])
+    print(f"{result.feasible.sum()} grasps hold; {result.refused}")
+    print(f"best  {result.best}")
+
+    apart = ga.optimize(problem, quality=spread, require=[ga.CollisionFree()])
     print(f"contacts farthest apart: {1000 * apart.best.quality:.1f} mm at chart {apart.best.chart}")
 
     folder = Path("out/schunk_can")

@@ -37,6 +37,8 @@ SINGULAR = 1e-3
 #: Step at which an ascent is at rest; its error in the index is the square of it.
 SMALL_STEP = 1e-8
 
+MANIPULABILITY = ("inverse_condition_number", "manipulability_volume", "smallest_semi_axis")
+
 
 # The second route ---------------------------------------------------------------------------------
 
@@ -409,7 +411,7 @@ def test_result_verifies_itself(result: ga.Result) -> None:
     assert report.passed, str(report)
 
 
-@pytest.mark.parametrize("index", sorted(ga.quality.INDICES))
+@pytest.mark.parametrize("index", MANIPULABILITY)
 def test_every_index_has_several_local_maxima(index: str, result: ga.Result) -> None:
     """So that local search would not do."""
     qualities = ga.quality.evaluate(index, ga.grasps.Grasps(result.problem, result.atlas.centers, result.atlas.system))
@@ -424,7 +426,7 @@ def elbows(x: Array) -> Array:
     return np.arctan2(sine, cosine)
 
 
-@pytest.mark.parametrize("index", sorted(ga.quality.INDICES))
+@pytest.mark.parametrize("index", MANIPULABILITY)
 def test_the_worst_grasp_has_a_stretched_finger(index: str, result: ga.Result) -> None:
     qualities = ga.quality.evaluate(index, ga.grasps.Grasps(result.problem, result.atlas.centers, result.atlas.system))
     worst = result.atlas.centers[int(np.argmin(qualities))]
@@ -446,7 +448,7 @@ def test_a_stretched_finger_is_singular(problem: ga.Problem, result: ga.Result) 
             stretched += stretched_between(result.atlas, int(i), int(j), finger)
     assert len(stretched) > 5
     grasps = ga.grasps.Grasps(problem, np.array(stretched), result.atlas.system)
-    for index in ga.quality.INDICES:
+    for index in MANIPULABILITY:
         assert ga.quality.evaluate(index, grasps).max() < 1e-9
 
 

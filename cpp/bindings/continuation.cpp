@@ -24,8 +24,8 @@ class PythonSystem : public System, public py::trampoline_self_life_support {
     const double* high = checked_vector(upper, n_variables, "upper");
     for (int i = 0; i < n_variables; ++i) {
       if (!(low[i] < high[i]))
-        throw Error("lower must be below upper; variable " + std::to_string(i) + " has " + std::to_string(low[i]) +
-                    " and " + std::to_string(high[i]));
+        throw Error("lower must be below upper; variable " + std::to_string(i) + " has " + to_text(low[i]) + " and " +
+                    to_text(high[i]));
       if (std::isfinite(high[i])) bounds_.push_back({i, 1.0, high[i]});
       if (std::isfinite(low[i])) bounds_.push_back({i, -1.0, -low[i]});
     }
@@ -44,6 +44,11 @@ class PythonSystem : public System, public py::trampoline_self_life_support {
     py::gil_scoped_acquire gil;
     call("residual", x, {equation_count()}, R);
     call("jacobian", x, {equation_count(), tangent_size()}, J);
+  }
+
+  std::string bound_name(int i) const override {
+    const Bound& bound = bounds_[static_cast<std::size_t>(i)];
+    return std::string(bound.sign > 0.0 ? "upper" : "lower") + " bound of variable " + std::to_string(bound.variable);
   }
 
   void slack(const double* x, double* out) const override {

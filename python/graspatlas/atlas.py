@@ -86,6 +86,43 @@ class Atlas:
     vertex_closed: NDArray[np.uint8]
     neighbour_pairs: NDArray[np.int32]
 
+    def check_arrays(self) -> None:
+        """Make sure that the arrays fit together, for an atlas that was read from a file.
+
+        Raises:
+            GraspAtlasError: If a shape, a type or an index is wrong, or a number is not finite.
+        """
+        n, k, v = len(self.centers), self.system.dimension, self.system.tangent_size
+        facets, vertices = len(self.facet_offsets), len(self.vertex_closed)
+        shapes = {
+            "centers": (n, self.system.configuration_size),
+            "bases": (n, k, v),
+            "residuals": (n,),
+            "facet_start": (n + 1,),
+            "facet_normals": (facets, k),
+            "facet_offsets": (facets,),
+            "facet_tags": (facets,),
+            "vertex_start": (n + 1,),
+            "vertices": (vertices, k),
+            "vertex_closed": (vertices,),
+            "neighbour_pairs": (len(self.neighbour_pairs), 2),
+        }
+        for name, shape in shapes.items():
+            array = getattr(self, name)
+            whole = name in ("facet_start", "facet_tags", "vertex_start", "vertex_closed", "neighbour_pairs")
+            if array.shape != shape or array.dtype.kind not in ("iu" if whole else "f"):
+                raise GraspAtlasError(f"array '{name}' has shape {array.shape} and type {array.dtype}, not {shape}")
+            if not whole and not np.isfinite(array).all():
+                raise GraspAtlasError(f"array '{name}' holds a number that is not finite")
+        ends_fit = all(
+            start[0] == 0 and start[-1] == end and (np.diff(start) >= 0).all()
+            for start, end in ((self.facet_start, facets), (self.vertex_start, vertices))
+        )
+        pairs = self.neighbour_pairs
+        in_range = (pairs >= 0).all() and (pairs < n).all() and (self.facet_tags < n).all()
+        if n == 0 or not ends_fit or not in_range:
+            raise GraspAtlasError("its charts, facets and neighbours do not fit together")
+
     @property
     def n_charts(self) -> int:
         """Number of charts."""
@@ -95,6 +132,11 @@ class Atlas:
     def dimension(self) -> int:
         """k: dimension of the manifold."""
         return int(self.bases.shape[1])
+
+    @property
+    def box_half_width(self) -> float:
+        """Half the width of the box that each polytope was cut from: it encloses the ball, and on a line exceeds it."""
+        return 1.5 * self.radius if self.dimension == 1 else self.radius
 
     @property
     def complete(self) -> bool:
@@ -161,6 +203,8 @@ class Atlas:
             within reach has the point near its tangent space.
         """
         point = np.asarray(x, float)
+        if not np.isfinite(point).all():
+            raise GraspAtlasError("x holds a number that is not finite")
         best, best_distance = -1, np.inf
         for chart in sorted(self._index.query_ball_point(self.system.embed(point), 2.0 * self.radius)):
             displacement = self.system.difference(self.centers[chart], point)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from graspatlas.atlas import Atlas, Closed
+from graspatlas.atlas import BOX_TAG, Atlas, Closed
 from graspatlas.grasps import Grasps
 from graspatlas.quality import INDICES, evaluate
 from graspatlas.requirements import requirement_name, screen
@@ -130,20 +130,59 @@ def _neighbour_checks(atlas: Atlas, system: AnySystem) -> Iterator[Check]:
     cosines = np.linalg.svd(M, compute_uv=False).min(axis=1, initial=1.0)
     widest = float(1.0 - cosines.min(initial=1.0))
     yield Check("neighbouring tangent spaces differ by 1 - cosine of", widest, atlas.epsilon * (1.0 + 1e-9))
-    worst, strangers = 0.0, 0
+    yield from _polytope_checks(atlas, system, pairs)
+
+
+def _polytope_checks(atlas: Atlas, system: AnySystem, pairs: dict[tuple[int, int], Array]) -> Iterator[Check]:
+    """Facets are where box, bounds and neighbours say, and the vertices are those of all these half-spaces."""
+    strangers, misplaced, outside, loose = 0, 0.0, 0.0, 0.0
+    images: list[list[Array]] = [[] for _ in range(atlas.n_charts)]
+    for (i, j), d in pairs.items():
+        images[i].append(atlas.bases[i] @ d)
+        images[j].append(-atlas.bases[j] @ d)
     for chart in range(atlas.n_charts):
         normals, offsets, tags = atlas.facets(chart)
+        vertices = atlas.vertices[atlas.vertex_start[chart] : atlas.vertex_start[chart + 1]]
         for normal, offset, tag in zip(normals, offsets, tags, strict=True):
-            if tag < 0:
-                continue
-            key = (min(chart, int(tag)), max(chart, int(tag)))
-            if key not in pairs:
+            expected = _half_space(atlas, system, pairs, chart, int(tag), normal)
+            if expected is None:
                 strangers += 1
                 continue
-            p = atlas.bases[chart] @ (pairs[key] if chart == key[0] else -pairs[key])
-            worst = max(worst, float(np.abs(2.0 * offset * normal - p).max()))
-    yield Check("facets between charts that are not neighbours", float(strangers), 0.0)
-    yield Check("half-spaces of neighbours are off the bisector by", worst, HALF_SPACE_TOLERANCE)
+            misplaced = max(misplaced, float(np.abs(expected[0] - normal).max()), abs(expected[1] - offset))
+        excess = vertices @ normals.T - offsets
+        outside = max(outside, float(excess.max()))
+        loose = max(loose, float(np.sort(np.abs(excess), axis=1)[:, atlas.dimension - 1].max()))
+        if images[chart]:
+            p = np.array(images[chart])
+            lengths = np.linalg.norm(p, axis=1)
+            outside = max(outside, float((vertices @ (p / lengths[:, None]).T - lengths / 2.0).max()))
+    yield Check("facets that neither box, bounds nor neighbours make", float(strangers), 0.0)
+    yield Check("half-spaces are off those of box, bounds and neighbours by", misplaced, HALF_SPACE_TOLERANCE)
+    yield Check("vertices lie outside a half-space by", outside, HALF_SPACE_TOLERANCE)
+    yield Check("vertices are off the facets that should make them by", loose, HALF_SPACE_TOLERANCE)
+
+
+def _half_space(
+    atlas: Atlas, system: AnySystem, pairs: dict[tuple[int, int], Array], chart: int, tag: int, normal: Array
+) -> tuple[Array, float] | None:
+    """Unit normal and offset that a facet must have, from what its tag says it is; None when there is no such thing."""
+    basis = atlas.bases[chart]
+    if tag >= 0:
+        key = (min(chart, tag), max(chart, tag))
+        if key not in pairs:
+            return None
+        p = basis @ (pairs[key] if chart == key[0] else -pairs[key])
+        length = float(np.linalg.norm(p))
+        return p / length, length / 2.0
+    if tag == BOX_TAG:
+        axis = int(np.abs(normal).argmax())
+        return np.sign(normal[axis]) * np.eye(atlas.dimension)[axis], atlas.box_half_width
+    bound = -2 - tag
+    if bound >= len(system.bound_normals):
+        return None
+    p = basis @ system.bound_normals[bound]
+    length = float(np.linalg.norm(p))
+    return p / length, max(float(system.slack(atlas.centers[chart])[bound]), 0.0) / length
 
 
 def check_result(result: Result) -> CheckReport:

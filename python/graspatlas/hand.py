@@ -8,6 +8,7 @@ from functools import cached_property
 from importlib import resources
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,15 @@ def _find(path: str | Path, folder: Path | None) -> Path:
     raise GraspAtlasError(f"file '{path}' does not exist; looked for it at {looked}")
 
 
+def _check_xml(name: str, text: str) -> None:
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise GraspAtlasError(f"the URDF of '{name}' is not XML: {error}") from None
+    if root.tag != "robot":
+        raise GraspAtlasError(f"the URDF of '{name}' must hold a <robot>, not a <{root.tag}>")
+
+
 @dataclass(frozen=True)
 class Body:
     """A thing described by a URDF.
@@ -55,6 +65,9 @@ class Body:
     urdf_path: str = ""
     package_dirs: tuple[str, ...] = ()
     srdf: str = ""
+
+    def __post_init__(self) -> None:
+        _check_xml(self.name, self.urdf)
 
     @classmethod
     def _read(
@@ -148,11 +161,15 @@ class Hand(Body):
     limits: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for joint in self.limits:
             if joint not in self.joints:
                 raise unknown_name("joint", joint, self.joints, f"in hand '{self.name}'")
-            if len(self.limits[joint]) != 2 or not self.limits[joint][0] <= self.limits[joint][1]:
+            if len(self.limits[joint]) != 2 or not self.limits[joint][0] < self.limits[joint][1]:
                 raise GraspAtlasError(f"limits of joint '{joint}' must be (lower, upper), got {self.limits[joint]}")
+        for info in self.model.hand_joints:
+            if info.name in self.limits and info.q_size != 1:
+                raise GraspAtlasError(f"joint '{info.name}' is continuous and has no limits; make it revolute")
 
     @classmethod
     def from_urdf(

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graspatlas.errors import GraspAtlasError
+from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.tables import number_array
 
 __all__ = ["HandMotions"]
 
@@ -36,7 +38,8 @@ class HandMotions:
 
     def __post_init__(self) -> None:
         h = len(self.joints)
-        mean, covariance = np.asarray(self.mean, float), np.asarray(self.covariance, float)
+        mean = number_array(self.mean, "the mean of the hand motions")
+        covariance = number_array(self.covariance, "the covariance of the hand motions")
         if mean.shape != (h,) or covariance.shape != (h, h):
             raise GraspAtlasError(
                 f"hand motions of {h} joints need a mean of shape ({h},) and a covariance of shape ({h}, {h}); "
@@ -63,7 +66,7 @@ class HandMotions:
         Raises:
             GraspAtlasError: If the samples have another shape or hold NaN.
         """
-        X = np.asarray(samples, float)
+        X = number_array(samples, "samples")
         if X.ndim != 2 or X.shape[0] < 2 or X.shape[1] != len(joints):
             raise GraspAtlasError(f"samples must have shape (z, {len(joints)}) with z of at least 2, got {X.shape}")
         return cls(tuple(joints), X.mean(axis=0), np.cov(X, rowvar=False).reshape(len(joints), -1))
@@ -83,20 +86,30 @@ class HandMotions:
 
     def kept(self, s: int) -> Array:
         """The motions that stay when the s least important are frozen [h, h - s]."""
+        self._check_count(s)
         return np.ascontiguousarray(self.E[:, : len(self.joints) - s])
 
     def frozen(self, s: int) -> Array:
         """E_s of eq (13): the s least important motions [h, s]."""
+        self._check_count(s)
         return np.ascontiguousarray(self.E[:, len(self.joints) - s :])
 
     def variance_kept(self, s: int) -> float:
         """Share of the variance that stays when the s least important motions are frozen."""
+        self._check_count(s)
         variances = np.maximum(self.variances, 0.0)
         total = float(variances.sum())
         return float(variances[: len(variances) - s].sum()) / total if total > 0.0 else 1.0
 
+    def _check_count(self, s: int) -> None:
+        if isinstance(s, bool) or not isinstance(s, Integral) or not 0 <= s <= len(self.joints):
+            raise GraspAtlasError(f"0 to {len(self.joints)} hand motions can be frozen, not {s!r}")
+
     def reordered(self, joints: Sequence[str]) -> HandMotions:
         """The same motions with the joints in another order."""
+        for name in joints:
+            if name not in self.joints:
+                raise unknown_name("joint", name, self.joints, "one of the hand motions'")
         at = [self.joints.index(name) for name in joints]
         return HandMotions(tuple(joints), self.mean[at], self.covariance[np.ix_(at, at)])
 

@@ -16,6 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.tables import number_array
 
 __all__ = ["Cone", "Cylinder", "Patch", "Plane", "Point", "Revolution", "patch_from_dict"]
 
@@ -26,7 +27,7 @@ EVERYWHERE: Interval = (-np.inf, np.inf)
 
 
 def _vector(value: ArrayLike, what: str, *, unit: bool = False) -> Vector3:
-    array = np.asarray(value, float)
+    array = number_array(value, what)
     if array.shape != (3,) or not np.isfinite(array).all():
         raise GraspAtlasError(f"{what} must be three finite numbers, got {value!r}")
     if unit:
@@ -39,9 +40,17 @@ def _vector(value: ArrayLike, what: str, *, unit: bool = False) -> Vector3:
 
 
 def _interval(value: Sequence[float], what: str) -> Interval:
-    if len(value) != 2 or not float(value[0]) < float(value[1]):
+    array = number_array(value, what)
+    if array.shape != (2,) or not array[0] < array[1]:
         raise GraspAtlasError(f"{what} must be (lower, upper) with lower below upper, got {value!r}")
-    return (float(value[0]), float(value[1]))
+    return (float(array[0]), float(array[1]))
+
+
+def _pair(value: Sequence[float], what: str) -> tuple[float, float]:
+    array = number_array(value, what)
+    if array.shape != (2,) or not np.isfinite(array).all():
+        raise GraspAtlasError(f"{what} must be two finite numbers, got {value!r}")
+    return (float(array[0]), float(array[1]))
 
 
 def _placement(origin: Vector3, y_axis: Vector3, x_hint: Vector3) -> Array:
@@ -183,9 +192,18 @@ class _Turned(Patch):
         object.__setattr__(self, "axis", _vector(self.axis, "axis", unit=True))
         object.__setattr__(self, "u_axis", _vector(self.u_axis, "u_axis", unit=True))
         if self.u_interval is not None:
-            object.__setattr__(self, "u_interval", _interval(self.u_interval, "u_interval"))
+            low, high = _interval(self.u_interval, "u_interval")
+            if not high - low <= 2.0 * np.pi:
+                raise GraspAtlasError(f"u_interval {self.u_interval} is wider than a turn; None is the whole circle")
+            object.__setattr__(self, "u_interval", (low, high))
         if self.v_interval is not None:
             object.__setattr__(self, "v_interval", _interval(self.v_interval, "v_interval"))
+
+    def _check_radius(self) -> None:
+        """The radius must not be negative anywhere in the interval of v, past an apex or between points."""
+        low, high = self.v_interval or self.default_v_interval()
+        if not (self.radius_at(np.linspace(low, high, 1001)) >= 0.0).all():
+            raise GraspAtlasError(f"the radius is negative in v_interval ({low:g}, {high:g}): end it before the apex")
 
     def outline(self) -> tuple[Array, Array]:
         """Breaks [n + 1] and cubic coefficients [n, 4], lowest power first, of the radius over v."""
@@ -252,7 +270,7 @@ class Cylinder(_Turned):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not (np.isfinite(self.radius) and self.radius > 0.0):
+        if isinstance(self.radius, str) or not (np.isfinite(self.radius) and self.radius > 0.0):
             raise GraspAtlasError(f"radius must be positive, got {self.radius}")
 
     def default_v_interval(self) -> Interval:
@@ -280,11 +298,14 @@ class Cone(_Turned):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        object.__setattr__(self, "heights", _pair(self.heights, "heights"))
+        object.__setattr__(self, "radii", _pair(self.radii, "radii"))
         (h0, h1), (r0, r1) = self.heights, self.radii
-        if not all(map(np.isfinite, (h0, h1, r0, r1))) or h0 == h1:
+        if h0 == h1:
             raise GraspAtlasError(f"a cone needs two different heights, got {self.heights}")
         if min(r0, r1) < 0.0 or max(r0, r1) <= 0.0:
             raise GraspAtlasError(f"a cone needs radii that are not negative, got {self.radii}")
+        self._check_radius()
 
     def outline(self) -> tuple[Array, Array]:
         """One linear piece."""
@@ -308,12 +329,13 @@ class Revolution(_Turned):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "heights", tuple(map(float, self.heights)))
-        object.__setattr__(self, "radii", tuple(map(float, self.radii)))
+        object.__setattr__(self, "heights", tuple(map(float, number_array(self.heights, "heights").ravel())))
+        object.__setattr__(self, "radii", tuple(map(float, number_array(self.radii, "radii").ravel())))
         if len(self.heights) < 2 or len(self.heights) != len(self.radii):
             raise GraspAtlasError("an outline needs at least two heights and as many radii")
         if not (np.diff(self.heights) > 0.0).all() or not (np.array(self.radii) > 0.0).all():
             raise GraspAtlasError("an outline needs ascending heights and positive radii")
+        self._check_radius()
 
     def outline(self) -> tuple[Array, Array]:
         """The natural cubic spline through the points."""
@@ -349,5 +371,7 @@ def patch_from_dict(data: Mapping[str, Any]) -> Patch:
             raise unknown_name("attribute", name, known, f"one of a {kind} patch's")
     try:
         return cls(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items()})
+    except GraspAtlasError as error:
+        raise GraspAtlasError(f"{kind} patch: {error}") from None
     except TypeError as error:
         raise GraspAtlasError(f"a {kind} patch cannot be made of {values}: {error}") from None

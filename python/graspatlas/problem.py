@@ -109,10 +109,11 @@ class Problem:
 
     def _check_x1(self) -> None:
         arrays = self.full_system.grasp_arrays(self.x1_array[None])
-        gaps = np.linalg.norm(arrays["hand_points"] - arrays["object_points"], axis=2)[0]
+        with np.errstate(over="ignore"):
+            gaps = np.linalg.norm(arrays["hand_points"] - arrays["object_points"], axis=2)[0]
         cosines = np.sum(arrays["hand_normals"] * arrays["object_normals"], axis=2)[0]
         angles = np.arccos(np.clip(-cosines, -1.0, 1.0))
-        if (gaps > CONTACT_TOLERANCE).any() or (angles > NORMAL_TOLERANCE).any():
+        if not ((gaps <= CONTACT_TOLERANCE).all() and (angles <= NORMAL_TOLERANCE).all()):
             rows = ", ".join(
                 f"{contact.frame}: {1000.0 * gap:.3g} mm, {np.degrees(angle):.3g} degrees"
                 for contact, gap, angle in zip(self.contacts, gaps, angles, strict=True)
@@ -135,6 +136,14 @@ class Problem:
     @cached_property
     def full_system(self) -> _core.GraspSystem:
         """The system F of all feasible grasps, no hand motion frozen: eq (9)."""
+        unknowns = self.hand.model.hand_v_size + (6 if self.object_joint == "free_flyer" else 3)
+        unknowns += sum(len(contact.free()) for contact in self.contacts)
+        equations = len(self.contacts) * (5 if self.object_joint == "free_flyer" else 3)
+        if equations >= unknowns:
+            raise GraspAtlasError(
+                f"problem '{self.name}' has {unknowns} unknowns and {equations} contact equations, which leave "
+                "no freedom: free some patch parameters or drop a contact"
+            )
         return self._system(np.eye(self.hand.model.hand_v_size))
 
     @cached_property
@@ -151,7 +160,13 @@ class Problem:
         """t: dimension of the manifold F of feasible grasps at x1, from the rank of its Jacobian."""
         system = self.full_system
         singular = np.linalg.svd(system.evaluate_jacobian(self.x1_array), compute_uv=False)
-        return system.tangent_size - int((singular > 1e-8 * singular[0]).sum())
+        rank = int((singular > 1e-8 * singular[0]).sum())
+        if rank < system.n_equations:
+            raise GraspAtlasError(
+                f"the {system.n_equations} contact equations of problem '{self.name}' have rank {rank} at x1: "
+                "a contact is stated twice, or x1 is singular; drop the redundant contact or move x1"
+            )
+        return system.dimension
 
     def frozen_motions(self, dimension: int) -> int:
         """How many hand motions are frozen for a manifold of dimension k: s = t - k (eq 12).

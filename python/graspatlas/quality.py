@@ -49,14 +49,16 @@ def batched(index: F) -> F:
 
 
 def _axes(grasps: Grasps, length_unit: float) -> Array:
-    """Semi-axes over the motions that are coordinated at x1 [n, connectivity]; zero where a grasp has lost one."""
+    """Semi-axes over the motions that are usually coordinated [n, connectivity]; zero where a grasp has lost one.
+
+    What is usual is the largest connectivity of x1 and of the grasps at hand.
+    """
+    if not (np.isfinite(length_unit) and length_unit > 0.0):
+        raise GraspAtlasError(f"length_unit must be positive, got {length_unit}")
     x1 = grasps.problem.x1_array
-    connectivity = int((_core.semi_axes(grasps.system, x1[None], length_unit) > 0.0).sum())
-    if length_unit == grasps.LENGTH_UNIT:
-        axes = grasps.semi_axes
-    else:
-        axes = np.asarray(_core.semi_axes(grasps.system, grasps.x, length_unit))
-    return axes[:, axes.shape[1] - connectivity :]
+    axes = np.asarray(_core.semi_axes(grasps.system, np.vstack([x1, grasps.x]), length_unit))
+    connectivity = int((axes > 0.0).sum(axis=1).max())
+    return axes[1:, axes.shape[1] - connectivity :]
 
 
 @batched
@@ -149,7 +151,7 @@ def find_index(quality: Quality) -> Callable[[Any], Any]:
     """
     if callable(quality):
         return quality
-    if quality not in INDICES:
+    if not isinstance(quality, str) or quality not in INDICES:
         raise unknown_name("quality index", quality, INDICES)
     return INDICES[quality]
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from graspatlas.grasps import Grasp, Grasps
 from graspatlas.problem import Problem
 from graspatlas.quality import Quality, quality_name
 from graspatlas.requirements import Require, parse_requirement, requirement_name
+from graspatlas.tables import number
 
 __all__ = ["Result", "load_result", "writable_folder"]
 
@@ -81,7 +81,8 @@ class Result:
         Raises:
             GraspAtlasError: If no grasp meets them.
         """
-        return self.grasp(int(np.argmax(np.where(self._some_feasible(), self.qualities, -np.inf))))
+        candidates = self._candidates()
+        return self.grasp(int(candidates[np.argmax(self.qualities[candidates])]))
 
     @cached_property
     def worst(self) -> Grasp:
@@ -90,13 +91,15 @@ class Result:
         Raises:
             GraspAtlasError: If no grasp meets them.
         """
-        return self.grasp(int(np.argmin(np.where(self._some_feasible(), self.qualities, np.inf))))
+        candidates = self._candidates()
+        return self.grasp(int(candidates[np.argmin(self.qualities[candidates])]))
 
-    def _some_feasible(self) -> NDArray[np.bool_]:
+    def _candidates(self) -> NDArray[np.intp]:
+        """Charts that meet the requirements; at least one."""
         if not self.feasible.any():
             counts = ", ".join(f"{name} refused {count}" for name, count in self.refused.items())
             raise GraspAtlasError(f"none of {self.atlas.n_charts} grasps meets the requirements ({counts}): relax one")
-        return self.feasible
+        return np.flatnonzero(self.feasible)
 
     @property
     def at_x1(self) -> Grasp:
@@ -203,16 +206,13 @@ def load_result(path: str | os.PathLike[str]) -> Result:
     if source.is_dir():
         source = source / "result.npz"
     try:
-        with np.load(source, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        header = json.loads(str(arrays.pop("header")))
-        if header["format"] != FORMAT:
-            raise ValueError("another format")
+        with open(source, "rb") as stream:
+            header, arrays = _read(stream)
     except FileNotFoundError:
         raise GraspAtlasError(f"result '{source}' does not exist") from None
     except OSError as error:
         raise GraspAtlasError(f"cannot read result '{source}': {error.strerror or error}") from None
-    except (ValueError, KeyError, EOFError, zipfile.BadZipFile, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
+    except Exception as error:  # a damaged archive fails in many ways, none of which executes anything
         raise GraspAtlasError(f"'{source}' is damaged or not a graspatlas result ({error}); compute it again") from None
     if header.get("version") != FORMAT_VERSION:
         raise GraspAtlasError(
@@ -221,30 +221,47 @@ def load_result(path: str | os.PathLike[str]) -> Result:
     return _from_parts(header, arrays, source)
 
 
+def _read(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Header and arrays of a result file."""
+    with np.load(stream, allow_pickle=False) as file:
+        arrays = {name: file[name] for name in file.files}
+    header = json.loads(str(arrays.pop("header")))
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise ValueError("its header is another one")
+    return header, arrays
+
+
 def _from_parts(header: Mapping[str, Any], arrays: dict[str, Any], source: Path) -> Result:
     try:
         problem = Problem.from_dict(header["problem"])
         qualities, feasible = arrays.pop("qualities"), arrays.pop("feasible")
         atlas = Atlas(
             system=problem.system(header["dimension"]),
-            radius=header["radius"],
-            epsilon=header["epsilon"],
+            radius=number(header["radius"], "radius"),
+            epsilon=number(header["epsilon"], "epsilon"),
             status=Status[header["status"]],
-            seconds=header["seconds"],
+            seconds=number(header["seconds"], "seconds"),
             **arrays,
         )
+        atlas.check_arrays()
+        if qualities.shape != (atlas.n_charts,) or feasible.shape != qualities.shape or feasible.dtype != bool:
+            raise GraspAtlasError("qualities and feasible need one entry a chart")
+        if qualities.dtype.kind != "f" or np.isnan(qualities).any():
+            raise GraspAtlasError("qualities must be numbers")
+        if not atlas.radius > 0.0 or not 0.0 < atlas.epsilon < 1.0 or not isinstance(header["quality"], str):
+            raise GraspAtlasError("its header holds a value that cannot be")
         return Result(
             problem=problem,
             atlas=atlas,
             quality=header["quality"],
             qualities=qualities,
-            quality_seconds=header["quality_seconds"],
-            requirements=tuple(_stored_requirement(text) for text in header["requirements"]),
+            quality_seconds=number(header["quality_seconds"], "quality_seconds"),
+            requirements=tuple(_stored_requirement(str(text)) for text in header["requirements"]),
             feasible=feasible,
-            refused=header["refused"],
+            refused={str(name): int(count) for name, count in header["refused"].items()},
         )
-    except (KeyError, TypeError) as error:
-        raise GraspAtlasError(f"result '{source}' lacks a part ({error}); compute it again") from None
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise GraspAtlasError(f"result '{source}' is damaged ({error}); compute it again") from None
 
 
 def _stored_requirement(text: str) -> Require | str:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from graspatlas.errors import GraspAtlasError, unknown_name
 
-__all__ = ["checked_table", "number", "numbers"]
+__all__ = ["checked_table", "number", "number_array", "numbers"]
 
 
 def checked_table(
@@ -56,3 +59,15 @@ def numbers(value: Any, what: str) -> tuple[float, ...]:
     if isinstance(value, str) or not isinstance(value, Sequence):
         raise GraspAtlasError(f"{what} must be a list of numbers, got {value!r}")
     return tuple(number(item, what) for item in value)
+
+
+def number_array(value: ArrayLike, what: str) -> NDArray[np.float64]:
+    """An array of numbers.
+
+    Raises:
+        GraspAtlasError: If it is none.
+    """
+    try:
+        return np.asarray(value, float)
+    except (TypeError, ValueError):
+        raise GraspAtlasError(f"{what} must be an array of numbers, got {value!r}") from None

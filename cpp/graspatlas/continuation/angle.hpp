@@ -11,4 +11,7 @@ inline double wrap_angle(double angle) {
   return angle - two_pi * std::floor(angle / two_pi + 0.5);
 }
 
+/// Charts on angles are smaller than this [rad], so that neighbours are less than half a turn apart.
+constexpr double kLargestAngularRadius = 1.5707963267948966;
+
 }  // namespace graspatlas

@@ -13,12 +13,18 @@ namespace {
 // A centre may miss a bound by rounding only.
 constexpr double kBoundTolerance = 1e-10;
 
-void check_options(const AtlasOptions& options) {
-  if (!(options.radius > 0.0) || !std::isfinite(options.radius))
-    throw Error("radius must be positive, got " + std::to_string(options.radius));
+void check_options(const AtlasOptions& options, const System& system) {
+  if (!(options.radius > 0.0)) throw Error("radius must be positive, got " + to_text(options.radius));
+  if (!(options.radius < system.radius_limit()))
+    throw Error("radius must be below " + to_text(system.radius_limit()) + " for this system, got " +
+                to_text(options.radius));
   if (!(options.epsilon > 0.0) || !(options.epsilon < 1.0))
-    throw Error("epsilon must lie between 0 and 1, got " + std::to_string(options.epsilon));
+    throw Error("epsilon must lie between 0 and 1, got " + to_text(options.epsilon));
 }
+
+// Half the width of a chart's box. It encloses the ball of the chart's radius, and on a line the box must be wider than
+// the ball so that it has ends outside.
+double half_width(int dimension, double radius) { return dimension == 1 ? 1.5 * radius : radius; }
 
 }  // namespace
 
@@ -41,9 +47,10 @@ Atlas::Atlas(System& system, const double* x0, const AtlasOptions& options)
       bound_in_chart_(k_),
       direction_(k_),
       embedding_(system.embedding_size()) {
-  check_options(options);
+  check_options(options, system);
   for (double value : x_new_)
     if (!std::isfinite(value)) throw Error("x0 holds a number that is not finite");
+  system.check_point(x0);
   ++projections_;
   switch (newton_.project_freely(x_new_.data(), Phi_new_.data())) {
     case Projection::converged:
@@ -55,9 +62,13 @@ Atlas::Atlas(System& system, const double* x0, const AtlasOptions& options)
           std::to_string(k_) + "; drop redundant equations or move x0");
     case Projection::not_converged:
       throw Error("x0 is not on the manifold and could not be projected onto it: residual " +
-                  std::to_string(newton_.residual()));
+                  to_text(newton_.residual()));
   }
-  if (!inside_bounds(x_new_.data())) throw Error("x0, projected onto the manifold, lies outside the bounds");
+  if (!inside_bounds(x_new_.data())) {
+    const auto worst = std::min_element(slack_.begin(), slack_.end()) - slack_.begin();
+    throw Error("x0, projected onto the manifold, breaks the " + system.bound_name(static_cast<int>(worst)) + " by " +
+                to_text(-slack_[worst]));
+  }
   add_chart();
 }
 
@@ -89,12 +100,17 @@ void Atlas::expand_vertex(int i, int vertex) {
   for (int c = 0; c < k_; ++c) norm += v[c] * v[c];
   norm = std::sqrt(norm);
   for (int c = 0; c < k_; ++c) direction_[c] = v[c] / norm;
+  vertex_.assign(v, v + k_);
 
   Closed reason = Closed::open;
   for (double alpha = options_.radius; alpha >= options_.smallest_step * options_.radius; alpha *= options_.shrink) {
     reason = attempt(i, direction_.data(), alpha);
     if (reason == Closed::open) {
       add_chart();
+      // The new neighbour cuts the vertex off; should rounding keep it, it must not be expanded again.
+      for (int u = 0; u < polytopes_[i].vertex_count(); ++u)
+        if (std::equal(vertex_.begin(), vertex_.end(), polytopes_[i].vertex(u)))
+          polytopes_[i].close(u, static_cast<std::uint8_t>(Closed::curvature));
       return;
     }
   }
@@ -140,7 +156,7 @@ int Atlas::add_chart() {
   centers_.insert(centers_.end(), x_new_.begin(), x_new_.end());
   bases_.insert(bases_.end(), Phi_new_.begin(), Phi_new_.end());
   residuals_.push_back(newton_.residual());
-  polytopes_.emplace_back(k_, options_.radius);
+  polytopes_.emplace_back(k_, half_width(k_, options_.radius));
   cut_by_bounds(j);
   meet_neighbours(j);
   open_.push_back(j);

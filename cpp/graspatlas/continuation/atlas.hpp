@@ -76,7 +76,7 @@ class Atlas {
 
   // Scratch: the candidate chart, and work space of the tests.
   std::vector<double> x_new_, Phi_new_, step_, displacement_, p_ij_, p_ji_, work_, slack_, bound_in_chart_, direction_,
-      embedding_;
+      vertex_, embedding_;
   std::vector<int> near_;
 };
 

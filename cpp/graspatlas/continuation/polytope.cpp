@@ -97,13 +97,13 @@ bool Polytope::cut(const double* normal, double offset, int tag) {
   scratch.shared_facets.resize(k_);
   double* signed_distance = scratch.signed_distance.data();
   std::uint16_t* shared = scratch.shared_facets.data();
-  const double limit = offset + kOnPlane * (offset + 1.0);
+  const double tolerance = kOnPlane * (offset + 1.0);
   int outside_count = 0;
   for (int i = 0; i < count; ++i) {
-    double s = -limit;
+    double s = -offset;
     for (int c = 0; c < k_; ++c) s += normal[c] * vertex(i)[c];
-    signed_distance[i] = s;
-    outside_count += s > 0.0;
+    signed_distance[i] = s > tolerance ? s : std::min(s, 0.0);
+    outside_count += s > tolerance;
   }
   if (outside_count == 0 || outside_count == count) return false;
 

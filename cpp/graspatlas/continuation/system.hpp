@@ -11,6 +11,12 @@ struct Error : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// A number in a message, three digits.
+std::string to_text(double number);
+
+/// Throws Error unless the four numbers are a quaternion of length one.
+void check_quaternion(const double* quaternion);
+
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -59,6 +65,14 @@ class System {
   int bound_count() const { return static_cast<int>(bound_normals_.rows()); }
   const RowMatrix& bound_normals() const { return bound_normals_; }
   virtual void slack(const double* x, double* out) const;
+  /// What bound i is, for messages.
+  virtual std::string bound_name(int i) const;
+
+  /// Throws Error when x names no configuration, such as a quaternion that is not of length one.
+  virtual void check_point(const double* x) const;
+
+  /// Charts must be smaller: with angles among the coordinates, displacements of more than half a turn are ambiguous.
+  virtual double radius_limit() const;
 
  protected:
   void set_bound_normals(const RowMatrix& B) { bound_normals_ = B; }

@@ -23,8 +23,8 @@ void Sphere::linearize(const double* x, double* R, double* J) {
 Torus::Torus(double major_radius, double minor_radius)
     : System(3, 3, 1, 3), major_(major_radius), minor_(minor_radius) {
   if (!(minor_radius > 0.0) || !(major_radius > minor_radius) || !std::isfinite(major_radius))
-    throw Error("a torus needs 0 < minor radius < major radius; got major " + std::to_string(major_radius) +
-                ", minor " + std::to_string(minor_radius));
+    throw Error("a torus needs 0 < minor radius < major radius; got major " + to_text(major_radius) + ", minor " +
+                to_text(minor_radius));
 }
 
 void Torus::residual(const double* x, double* R) {
@@ -58,7 +58,13 @@ void Angles::embed(const double* x, double* out) const {
   }
 }
 
+double Angles::radius_limit() const { return kLargestAngularRadius; }
+
 Rotations::Rotations() : System(4, 3, 0, 9) {}
+
+double Rotations::radius_limit() const { return kLargestAngularRadius; }
+
+void Rotations::check_point(const double* x) const { check_quaternion(x); }
 
 void Rotations::integrate(const double* x, const double* v, double* out) const {
   const Eigen::Map<const Eigen::Quaterniond> q(x);

@@ -32,6 +32,7 @@ class Angles : public System {
   void integrate(const double* x, const double* v, double* out) const override;
   void difference(const double* x0, const double* x1, double* out) const override;
   void embed(const double* x, double* out) const override;
+  double radius_limit() const override;
 };
 
 /// All rotations and no equation: SO(3) as unit quaternions (x, y, z, w), tangent vectors are body rotation
@@ -44,6 +45,8 @@ class Rotations : public System {
   void integrate(const double* x, const double* v, double* out) const override;
   void difference(const double* x0, const double* x1, double* out) const override;
   void embed(const double* x, double* out) const override;
+  void check_point(const double* x) const override;
+  double radius_limit() const override;
 };
 
 }  // namespace graspatlas

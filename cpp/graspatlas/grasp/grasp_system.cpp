@@ -86,7 +86,7 @@ GraspSystem::GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> cont
     throw Error("the hand motions have " + std::to_string(motions.rows()) + " rows, the hand has " +
                 std::to_string(model_->hand_v_size()) + " joint velocities");
   if (!(length_scale > 0.0) || !std::isfinite(length_scale))
-    throw Error("length_scale must be positive, got " + std::to_string(length_scale));
+    throw Error("length_scale must be positive, got " + to_text(length_scale));
   visit_sides(contacts_, [&](const ContactSide& side) {
     if (side.u.free) parameters_.push_back({&side.u, side.patch->u_is_angle()});
     if (side.v.free) parameters_.push_back({&side.v, false});
@@ -111,14 +111,15 @@ void GraspSystem::add_joint_bounds(const std::vector<double>& lower, const std::
   for (const JointInfo& joint : model_->hand_joints()) {
     if (joint.q_size != 1) continue;
     const double low = lower[joint.q_index], high = upper[joint.q_index];
-    if (!(low <= high))
-      throw Error("joint '" + joint.name + "' has limits [" + std::to_string(low) + ", " + std::to_string(high) + "]");
     const auto add = [&](double sign, double limit, const char* side) {
       bounds_.push_back({joint.q_index, joint.v_index, true, sign, limit, 1.0});
       bound_names_.push_back(std::string(side) + " limit of joint '" + joint.name + "'");
     };
     // A joint that no kept motion moves stays where x1 has it.
     if (motions_.row(joint.v_index).norm() < 1e-12) continue;
+    if (!(low < high))
+      throw Error("joint '" + joint.name + "' has limits [" + to_text(low) + ", " + to_text(high) +
+                  "]; the lower must be below the upper, and a joint that does not move is of type fixed");
     if (std::isfinite(high)) add(1.0, high, "upper");
     if (std::isfinite(low)) add(-1.0, -low, "lower");
   }
@@ -330,6 +331,12 @@ void GraspSystem::embed(const double* x, double* out) const {
 void GraspSystem::slack(const double* x, double* out) const {
   for (const Bound& bound : bounds_) *out++ = (bound.limit - bound.sign * x[bound.at]) / bound.scale;
 }
+
+void GraspSystem::check_point(const double* x) const {
+  if (model_->object_kind() == ObjectJoint::free_flyer) check_quaternion(x + model_->hand_q_size() + 3);
+}
+
+double GraspSystem::radius_limit() const { return kLargestAngularRadius; }
 
 void GraspSystem::contact_points(const double* x, ContactPoint* out) {
   model_->update(x, false);

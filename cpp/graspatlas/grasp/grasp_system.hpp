@@ -58,6 +58,9 @@ class GraspSystem : public System {
   void difference(const double* x0, const double* x1, double* out) const override;
   void embed(const double* x, double* out) const override;
   void slack(const double* x, double* out) const override;
+  std::string bound_name(int i) const override { return bound_names_[static_cast<std::size_t>(i)]; }
+  void check_point(const double* x) const override;
+  double radius_limit() const override;
 
   const Model& model() const { return *model_; }
   int contact_count() const { return static_cast<int>(contacts_.size()); }

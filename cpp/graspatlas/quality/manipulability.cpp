@@ -19,7 +19,7 @@ Manipulability::Manipulability(GraspSystem& system, double length_unit) : system
   if (system.object_dof() == 0 || system.contact_count() == 0)
     throw Error("manipulability needs an object and at least one contact");
   if (!(length_unit > 0.0) || !std::isfinite(length_unit))
-    throw Error("length_unit must be positive, got " + std::to_string(length_unit));
+    throw Error("length_unit must be positive, got " + to_text(length_unit));
   J_.resize(3 * system.contact_count(), system.model().hand_v_size());
   Gt_.resize(3 * system.contact_count(), system.object_dof());
 }
@@ -59,7 +59,9 @@ void Manipulability::semi_axes(const double* x, double* out) {
   const Matrix T = small.matrixQR().topRows(axes).triangularView<Eigen::Upper>();
   const Eigen::JacobiSVD<Matrix> svd(T);
   const auto& sigma = svd.singularValues();
-  if (!(sigma(axes - 1) > kRankTolerance * sigma(0))) return;
+  // An object motion that takes no joint velocity: beside the others, or beside what grasps of this size take.
+  const double usual = std::max(sigma(0), Gt_.norm() / J_.norm());
+  if (!(sigma(axes - 1) > kRankTolerance * usual)) return;
   for (Eigen::Index i = 0; i < axes; ++i) out[dof - axes + i] = 1.0 / sigma(i);
 }
 

@@ -1,0 +1,47 @@
+"""Fixtures that several files share; the atlases are traced once for the whole run."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+import graspatlas as ga
+
+settings.register_profile(
+    "graspatlas",
+    deadline=None,
+    derandomize=True,
+    database=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
+)
+settings.load_profile("graspatlas")
+
+
+@pytest.fixture(scope="session")
+def can() -> ga.Problem:
+    return ga.load_problem("schunk_can")
+
+
+@pytest.fixture(scope="session")
+def bottle() -> ga.Problem:
+    return ga.load_problem("schunk_oil_bottle")
+
+
+@pytest.fixture(scope="session")
+def can_result(can: ga.Problem) -> ga.Result:
+    return ga.optimize(can, dimension=2, radius=0.17, epsilon=0.5, quality="manipulability_volume")
+
+
+@pytest.fixture(scope="session")
+def bottle_result(bottle: ga.Problem) -> ga.Result:
+    return ga.optimize(bottle, dimension=2, radius=0.04, epsilon=0.5, quality="manipulability_volume")
+
+
+@pytest.fixture(scope="session")
+def small_result(bottle: ga.Problem) -> ga.Result:
+    return ga.optimize(bottle, dimension=2, radius=0.2, epsilon=0.5, quality="manipulability_volume")
+
+
+@pytest.fixture(scope="session")
+def sphere() -> ga.Atlas:
+    return ga.build_atlas(ga.systems.Sphere(3), [0.0, 0.0, 1.0], radius=0.1, epsilon=0.1)
