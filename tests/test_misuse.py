@@ -84,7 +84,7 @@ def test_first_points_far_away_and_where_the_jacobian_vanishes():
     assert len(str(caught.value)) < 200
     with pytest.raises(ga.GraspAtlasError, match="lost rank"):
         build(Sphere(3), [0, 0, 0])
-    with pytest.raises(ga.GraspAtlasError, match="breaks the lower bound of variable 2 by 0.5"):
+    with pytest.raises(ga.GraspAtlasError, match=r"breaks the lower bound of variable 2 by 0\.5"):
         build(PythonSphere(3, lower=[-np.inf, -np.inf, 0.5]), [1, 0, 0])
 
 
