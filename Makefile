@@ -4,6 +4,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := pyproject.toml CMakeLists.txt $(shell find cpp python robots -type f -not -name '*.pyc')
 
+# Writes the type stubs of the compiled module below a folder.
+define stubs
+$(BIN)/pybind11-stubgen graspatlas._core --output-dir $(1) --numpy-array-use-type-var --exit-code
+$(BIN)/ruff format --quiet --config pyproject.toml $(1)/graspatlas/_core.pyi
+endef
+
 .PHONY: demo test bench lint stubs format clean
 
 demo: $(VENV)/.installed
@@ -22,6 +28,8 @@ lint: $(VENV)/.tools
 	$(BIN)/ruff format --check .
 	$(BIN)/clang-format --dry-run --Werror $$(git ls-files '*.cpp' '*.hpp')
 	$(BIN)/mypy
+	$(call stubs,build/stubs)
+	diff build/stubs/graspatlas/_core.pyi python/graspatlas/_core.pyi
 
 format: $(VENV)/.tools
 	$(BIN)/ruff check --fix .
@@ -30,8 +38,7 @@ format: $(VENV)/.tools
 
 # Type stubs of the compiled module, from the module itself.
 stubs: $(VENV)/.tools
-	$(BIN)/pybind11-stubgen graspatlas._core --output-dir python --numpy-array-use-type-var
-	$(BIN)/ruff format python/graspatlas/_core.pyi
+	$(call stubs,python)
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

@@ -46,9 +46,13 @@ def grasp_rows(name: str, dimension: int, radius: float) -> None:
     seconds, values = median_seconds(
         lambda: ga.quality.evaluate("manipulability_volume", ga.Grasps(problem, atlas.centers, system))
     )
-    print(
-        f"{'  manipulability':32} {len(values):7d} grasps {1e3 * seconds:9.1f} ms {1e6 * seconds / len(values):9.2f} us each"
+    each = 1e6 * seconds / len(values)
+    print(f"{'  manipulability':32} {len(values):7d} grasps {1e3 * seconds:9.1f} ms {each:9.2f} us each")
+    seconds, values = median_seconds(
+        lambda: ga.quality.evaluate("force_closure_margin", ga.Grasps(problem, atlas.centers, system))
     )
+    each = 1e6 * seconds / len(values)
+    print(f"{'  force closure':32} {len(values):7d} grasps {1e3 * seconds:9.1f} ms {each:9.2f} us each")
 
 
 def projection_row() -> None:

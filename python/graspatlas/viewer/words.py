@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from graspatlas.quality import INDICES, quality_name
+from graspatlas.requirements import requirement_name
 from graspatlas.result import Result
 from graspatlas.viewer.scene import COLOURS, Colour, Exhibit
 
@@ -46,7 +47,11 @@ def subtitle(result: Result) -> str:
     name = quality_name(result.quality)
     known = name in INDICES and result.quality in (name, INDICES[name])
     unit = "; lengths in mm" if known else ""
-    return f"{result.problem.name}: atlas of {result.atlas.n_charts} charts, {result.status}{unit}"
+    those = ""
+    if result.requirements:
+        names = " and ".join(requirement_name(r).split(":")[0].replace("_", " ") for r in result.requirements)
+        those = f"; {result.feasible.sum()} are {names}"
+    return f"{result.problem.name}: atlas of {result.atlas.n_charts} charts, {result.status}{those}{unit}"
 
 
 def legend() -> list[tuple[Colour, str]]:
