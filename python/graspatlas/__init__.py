@@ -1,11 +1,15 @@
 """Globally best grasps: an atlas of all feasible grasps, and any quality index read on it."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from graspatlas import motions, patches, quality, systems
 from graspatlas.atlas import Atlas, Closed, Status
 from graspatlas.contacts import Contact, FirstGrasp
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasp, Grasps
 from graspatlas.hand import Body, Hand
+from graspatlas.local_search import Climb, Peak, climb, local_maxima, peaks_of
 from graspatlas.motions import HandMotions
 from graspatlas.optimizer import build_atlas, optimize
 from graspatlas.problem import Problem
@@ -16,11 +20,24 @@ from graspatlas.result import Result, load_result
 from graspatlas.systems import System
 from graspatlas.viewer import export_html, save_picture, view
 
+if TYPE_CHECKING:
+    from graspatlas.viewer.figures import (
+        plot_atlas,
+        plot_best_and_worst,
+        plot_climbs,
+        plot_ellipsoid,
+        plot_growth,
+        plot_local_maxima,
+        plot_planar_grasp,
+        plot_planar_indices,
+    )
+
 __version__ = "0.1.0"
 
 __all__ = [
     "Atlas",
     "Body",
+    "Climb",
     "Closed",
     "CollisionFree",
     "Contact",
@@ -32,6 +49,7 @@ __all__ = [
     "Hand",
     "HandMotions",
     "JointMargin",
+    "Peak",
     "Problem",
     "Result",
     "Status",
@@ -39,14 +57,32 @@ __all__ = [
     "batched",
     "build_atlas",
     "bundled_problems",
+    "climb",
     "export_html",
     "load_problem",
     "load_result",
+    "local_maxima",
     "motions",
     "optimize",
     "patches",
+    "peaks_of",
+    "plot_atlas",
+    "plot_best_and_worst",
+    "plot_climbs",
+    "plot_ellipsoid",
+    "plot_growth",
+    "plot_local_maxima",
+    "plot_planar_grasp",
+    "plot_planar_indices",
     "quality",
     "save_picture",
     "systems",
     "view",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Figures, imported on first use: matplotlib takes longer to import than an atlas to build."""
+    if name.startswith("plot_") and name in __all__:
+        return getattr(import_module("graspatlas.viewer.figures"), name)
+    raise AttributeError(f"module 'graspatlas' has no attribute '{name}'")

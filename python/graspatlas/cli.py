@@ -1,4 +1,4 @@
-"""Command line: graspatlas list, optimize, view."""
+"""Command line: graspatlas list, optimize, view, reproduce."""
 
 from __future__ import annotations
 
@@ -97,6 +97,15 @@ def _parser() -> argparse.ArgumentParser:
     look.add_argument("--picture", type=Path, metavar="FILE", help="write a PNG picture instead")
     look.add_argument("--no-browser", action="store_true", help="do not open a browser, only say where to look")
     look.set_defaults(run=_view)
+
+    again = commands.add_parser(
+        "reproduce", help="run the paper's experiments and write a page to lay beside the paper"
+    )
+    again.add_argument(
+        "--output", type=Path, required=True, metavar="FOLDER", help="write index.html and its files there"
+    )
+    again.add_argument("--experiment", metavar="NAME", help="only this experiment")
+    again.set_defaults(run=_reproduce)
     return parser
 
 
@@ -186,6 +195,14 @@ def _view(options: argparse.Namespace) -> int:
         print(f"wrote {options.picture}", file=sys.stderr)
     if not options.html and not options.picture:
         view(result, open_browser=not options.no_browser)
+    return 0
+
+
+def _reproduce(options: argparse.Namespace) -> int:
+    from graspatlas.reproduce import reproduce  # slow to import
+
+    page = reproduce(options.output, options.experiment)
+    print(f"wrote {page}: open it in a browser")
     return 0
 
 

@@ -1,0 +1,106 @@
+"""One run: an atlas with its quality, and its numbers beside the paper's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from graspatlas.atlas import Status
+from graspatlas.local_search import local_maxima
+from graspatlas.optimizer import optimize
+from graspatlas.problems import load_problem
+from graspatlas.reproduce.published import PUBLISHED, WHY, Published
+from graspatlas.reproduce.report import Number
+from graspatlas.result import Result
+from graspatlas.viewer.figures.indices import SINGULAR_BELOW, with_index
+
+__all__ = ["Setting", "numbers_of", "run"]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How an experiment is run here.
+
+    Attributes:
+        problem: Name of the bundled problem.
+        dimension: k.
+        radius: r [rad, or length scales].
+        epsilon: epsilon.
+        quality: The index.
+    """
+
+    problem: str
+    dimension: int
+    radius: float
+    epsilon: float
+    quality: str
+
+
+def run(setting: Setting) -> Result:
+    """Trace the atlas and evaluate the index: lengths in millimetres, in length scales where the problem is planar.
+
+    Raises:
+        KeyboardInterrupt: If it was interrupted: an atlas cut short is none to report.
+    """
+    result = optimize(
+        load_problem(setting.problem),
+        dimension=setting.dimension,
+        radius=setting.radius,
+        epsilon=setting.epsilon,
+        quality=setting.quality,
+        progress=False,
+    )
+    if result.status is Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    return with_index(result, setting.quality) if result.problem.object_joint == "planar" else result
+
+
+def numbers_of(result: Result, setting: Setting, label: str = "") -> list[Number]:
+    """The numbers of a run beside the paper's.
+
+    Args:
+        result: What :func:`run` returned.
+        setting: How it was run.
+        label: Name of the run, when its experiment has several.
+    """
+    paper = PUBLISHED[setting.problem, setting.dimension]
+    rows = [*_sizes(result, setting, paper), *_times(result, paper), *_qualities(result, setting)]
+    return [Number(label, *row) for row in rows]
+
+
+def _sizes(result: Result, setting: Setting, paper: Published) -> Iterator[tuple[Any, ...]]:
+    problem, k = result.problem, setting.dimension
+    full = problem.full_system
+    planar = problem.object_joint == "planar"
+    yield "variables of F", paper.variables, full.tangent_size, "", WHY["variables"]
+    yield "equations of F", paper.equations, full.n_equations, "", WHY["equations"]
+    yield "dimension t of feasible grasps", paper.full_dimension, problem.full_dimension
+    yield "frozen hand motions s", paper.frozen_motions, problem.frozen_motions(k)
+    yield "dimension k of relevant grasps", paper.dimension, result.dimension
+    same = paper.radius == setting.radius
+    yield "radius r of a chart", paper.radius, setting.radius, "", "" if same else WHY["radius"]
+    yield "epsilon", paper.epsilon, setting.epsilon
+    yield "charts", paper.charts, result.atlas.n_charts, "", WHY["charts of the planar hand" if planar else "charts"]
+    yield "atlas", None, str(result.status)
+
+
+def _times(result: Result, paper: Published) -> Iterator[tuple[Any, ...]]:
+    atlas, index = result.atlas.seconds, result.quality_seconds
+    if paper.total_seconds is not None:
+        yield "time for atlas and index", paper.total_seconds, atlas + index, "s", WHY["atlas time"]
+    yield "time for the atlas", paper.atlas_seconds, atlas, "s", WHY["atlas time"] if paper.atlas_seconds else ""
+    yield "time for the index", paper.index_seconds, index, "s", WHY["index time"] if paper.index_seconds else ""
+
+
+def _qualities(result: Result, setting: Setting) -> Iterator[tuple[Any, ...]]:
+    scaled = with_index(result, setting.quality)
+    index = setting.quality.replace("_", " ")
+    n_singular = int((scaled.qualities < SINGULAR_BELOW[setting.quality]).sum())
+    unit = f"{1e3 * result.problem.length_scale:g} mm" if result.problem.object_joint == "planar" else "mm"
+    yield f"best {index}, lengths in {unit}", None, result.best.quality
+    yield f"worst {index}, lengths in {unit}", None, result.worst.quality
+    yield "index at the first grasp", None, float(result.qualities[0])
+    yield f"singular charts (below {SINGULAR_BELOW[setting.quality]:g}, lengths in length scales)", None, n_singular
+    yield "local maxima on the graph of charts", None, len(local_maxima(result))
+    yield "largest residual of a chart centre", None, float(result.atlas.residuals.max())

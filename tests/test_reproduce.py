@@ -1,0 +1,319 @@
+"""Reproduction: local search, the report's folder, and the page."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import subprocess
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+from test_viewer import BROWSER_FLAGS, find_browser
+
+import graspatlas as ga
+from graspatlas.local_search import climb, local_maxima, peaks_of
+from graspatlas.reproduce import EXPERIMENT_NAMES, reproduce
+from graspatlas.reproduce.experiments import EXPERIMENTS
+from graspatlas.reproduce.folder import MARKER, report_folder
+from graspatlas.viewer.figures.indices import with_index
+
+Array = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def planar_result() -> ga.Result:
+    return with_index(ga.optimize(ga.load_problem("planar_hand")), "inverse_condition_number")
+
+
+@pytest.fixture(scope="session")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("reproduce") / "report"
+    page = reproduce(folder, "planar_hand", progress=False)
+    assert page == folder / "index.html"
+    return folder
+
+
+# Local search
+
+
+@pytest.mark.parametrize("name", ["planar_result", "can_result", "bottle_result"])
+def test_local_maxima_are_the_charts_that_no_neighbour_beats(name: str, request: pytest.FixtureRequest) -> None:
+    result: ga.Result = request.getfixturevalue(name)
+    q = result.qualities
+    brute = {i for i, near in enumerate(result.atlas.neighbours) if all(q[i] > q[j] for j in near)}
+    found = local_maxima(result)
+    assert set(found.tolist()) == brute
+    assert found[0] == result.best.chart
+    assert (np.diff(q[found]) <= 0.0).all()
+    assert len(found) > 1
+
+
+def test_equal_charts_count_once(planar_result: ga.Result) -> None:
+    level = replace(planar_result, qualities=np.ones(planar_result.atlas.n_charts))
+    assert local_maxima(level).tolist() == [0]
+    island = np.zeros(planar_result.atlas.n_charts)
+    island[[7, *planar_result.atlas.neighbours[7]]] = 1.0
+    first = min(7, *planar_result.atlas.neighbours[7])
+    assert local_maxima(replace(planar_result, qualities=island)).tolist() == [first]
+
+
+def test_local_maxima_meet_the_requirements(planar_result: ga.Result) -> None:
+    feasible = np.ones(planar_result.atlas.n_charts, bool)
+    feasible[planar_result.best.chart] = False
+    result = replace(planar_result, feasible=feasible)
+    found = local_maxima(result)
+    assert planar_result.best.chart not in found
+    assert found[0] == result.best.chart
+    assert local_maxima(replace(planar_result, feasible=np.zeros_like(feasible))).size == 0
+
+
+@pytest.mark.parametrize("name", ["planar_result", "can_result", "bottle_result"])
+def test_climbing_never_lowers_the_index_nor_leaves_the_manifold(name: str, request: pytest.FixtureRequest) -> None:
+    result: ga.Result = request.getfixturevalue(name)
+    system = result.atlas.system
+    for chart in np.random.default_rng(4).choice(result.atlas.n_charts, 8, replace=False):
+        end = climb(result, int(chart), max_steps=40)
+        assert end.chart == chart
+        assert end.qualities[0] == result.qualities[chart]
+        assert (np.diff(end.qualities) > 0.0).all()
+        assert end.n_steps == len(end.qualities) - 1 <= 40
+        assert np.abs(system.evaluate_residual(end.x)).max() < 1e-9
+        assert system.slack(end.x).min(initial=0.0) >= -1e-9
+        again = ga.quality.evaluate(result.quality, ga.Grasps(result.problem, end.x, system))  # type: ignore[arg-type]
+        assert end.quality == pytest.approx(again[0], rel=1e-6)
+
+
+def test_a_climb_ends_at_a_maximum(planar_result: ga.Result) -> None:
+    end = climb(planar_result, 0)
+    assert end.converged
+    system = planar_result.atlas.system
+    Phi = np.linalg.svd(system.evaluate_jacobian(end.x))[2][system.n_equations :]
+    random = np.random.default_rng(1)
+    around = []
+    for u in 1e-3 * random.normal(size=(200, 2)):
+        x = ga._core.project(system, end.x, Phi, u)  # type: ignore[attr-defined]
+        if system.slack(x).min() >= 0.0:
+            around.append(x)
+    values = ga.quality.evaluate(planar_result.quality, ga.Grasps(planar_result.problem, around, system))  # type: ignore[arg-type]
+    assert values.max() <= end.quality * (1.0 + 1e-6)
+
+
+def test_climbs_with_an_index_of_ones_own(planar_result: ga.Result) -> None:
+    def left(grasp: ga.Grasp) -> float:
+        return float(-grasp.object_xyz[0])
+
+    result = ga.optimize(planar_result.problem, quality=left)
+    end = climb(result, 5)
+    assert end.converged
+    assert end.quality > result.qualities[5]
+    assert end.quality < result.best.quality + 0.005
+
+
+def test_peaks_gather_the_climbs(planar_result: ga.Result) -> None:
+    climbs = [climb(planar_result, chart) for chart in range(0, 700, 45)]
+    peaks = peaks_of(planar_result, climbs)
+    assert sorted(np.concatenate([p.climbs for p in peaks])) == list(range(len(climbs)))
+    assert [p.quality for p in peaks] == sorted((p.quality for p in peaks), reverse=True)
+    assert 2 <= len(peaks) < len(climbs)
+    assert peaks_of(planar_result, []) == []
+
+
+def test_wrong_climbs_are_named(planar_result: ga.Result) -> None:
+    with pytest.raises(ga.GraspAtlasError, match="chart 99999 does not exist"):
+        climb(planar_result, 99999)
+    with pytest.raises(ga.GraspAtlasError, match="max_steps must be"):
+        climb(planar_result, 0, max_steps=0)
+
+
+# The folder
+
+
+def test_unknown_experiment_names_the_nearest(tmp_path: Path) -> None:
+    with pytest.raises(ga.GraspAtlasError, match="did you mean 'schunk_can'"):
+        reproduce(tmp_path / "report", "schunk_cann")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_experiments_are_those_that_are_named() -> None:
+    assert tuple(EXPERIMENTS) == EXPERIMENT_NAMES
+
+
+def test_a_folder_of_the_users_is_not_touched(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").write_text("years", encoding="utf-8")
+    with pytest.raises(ga.GraspAtlasError, match="holds no earlier report"):
+        reproduce(tmp_path / "mine", "sphere", progress=False)
+    (tmp_path / "file").write_text("x", encoding="utf-8")
+    with pytest.raises(ga.GraspAtlasError, match="it is no folder"):
+        reproduce(tmp_path / "file", "sphere", progress=False)
+    assert (tmp_path / "mine" / "thesis.txt").read_text(encoding="utf-8") == "years"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "mine"]
+
+
+def test_a_new_or_empty_folder_or_an_earlier_report_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    for target in (tmp_path / "empty", tmp_path / "deep" / "new"):
+        page = reproduce(target, "sphere", progress=False)
+        assert page.is_file()
+        (target / "old.png").write_bytes(b"")
+        assert reproduce(target, "sphere", progress=False) == page
+        assert not (target / "old.png").exists()
+        assert (target / MARKER).is_file()
+        assert target.stat().st_mode & 0o777 == 0o755
+    assert sorted(p.name for p in tmp_path.rglob(".*")) == [MARKER, MARKER]
+
+
+@pytest.mark.parametrize("failure", [KeyboardInterrupt(), OSError(28, "No space left on device")])
+def test_nothing_half_written_is_left(tmp_path: Path, failure: BaseException) -> None:
+    def write() -> None:
+        with report_folder(tmp_path / "report") as folder:
+            (folder / "index.html").write_text("half", encoding="utf-8")
+            raise failure
+
+    expected = ga.GraspAtlasError if isinstance(failure, OSError) else KeyboardInterrupt
+    with pytest.raises(expected) as caught:
+        write()
+    assert list(tmp_path.iterdir()) == []
+    if isinstance(failure, OSError):
+        assert "No space left" in str(caught.value)
+
+
+def test_an_earlier_report_survives_a_failure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    reproduce(tmp_path / "report", "sphere", progress=False)
+
+    def interrupted(progress: bool) -> Any:
+        raise KeyboardInterrupt
+
+    monkeypatch.setitem(EXPERIMENTS, "sphere", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        reproduce(tmp_path / "report", "sphere", progress=False)
+    assert (tmp_path / "report" / "index.html").is_file()
+    assert [p.name for p in tmp_path.iterdir()] == ["report"]
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x", encoding="utf-8")
+    with pytest.raises(ga.GraspAtlasError, match=r"cannot write the report to .*file"):
+        reproduce(tmp_path / "file" / "report", "sphere", progress=False)
+
+
+def test_progress_goes_to_standard_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    reproduce(tmp_path / "report", "sphere")
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("sphere: ")
+
+
+# The page
+
+
+class Links(HTMLParser):
+    """Everything that a page refers to, and its pictures without words."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.links: set[str] = set()
+        self.silent: list[str] = []
+        self.ids: set[str] = set()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = dict(attrs)
+        self.links |= {values[key] or "" for key in ("src", "href") if key in values}
+        if "id" in values:
+            self.ids.add(values["id"] or "")
+        if tag == "img" and not values.get("alt"):
+            self.silent.append(str(values))
+
+
+def test_page_is_offline_and_whole(report: Path) -> None:
+    text = (report / "index.html").read_text(encoding="utf-8")
+    assert "http" not in text
+    assert "//" not in re.sub(r"<style>.*?</style>", "", text, flags=re.DOTALL)
+    assert str(Path.home()) not in text
+    assert "$" not in text
+    found = Links()
+    found.feed(text)
+    assert found.silent == []
+    for link in found.links:
+        assert (link[1:] in found.ids) if link.startswith("#") else (report / link).is_file()
+    written = {p.name for p in report.iterdir()} - {"index.html", MARKER}
+    assert written == {link for link in found.links if not link.startswith("#")}
+    for name in ("figure_9_planar_hand.png", "numbers.csv", "numbers.json"):
+        assert name in written
+
+
+def test_pictures_are_not_blank(report: Path) -> None:
+    pictures = sorted(report.glob("*.png"))
+    assert len(pictures) == 5
+    for path in pictures:
+        with Image.open(path) as image:
+            assert image.width > 1000
+            assert np.asarray(image.convert("L"), float).std() > 10.0
+
+
+def test_csv_and_json_hold_the_same_numbers(report: Path) -> None:
+    with (report / "numbers.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    data = json.loads((report / "numbers.json").read_text(encoding="utf-8"))
+    assert len(rows) == len(data["numbers"]) > 30
+    for row, number in zip(rows, data["numbers"], strict=True):
+        assert row.keys() == number.keys()
+        for key, value in number.items():
+            if isinstance(value, float):
+                assert float(row[key]) == value
+            else:
+                assert row[key] == ("" if value is None else str(value))
+    assert {"python", "numpy", "pinocchio", "processors"} <= data["machine"].keys()
+
+
+def test_numbers_stand_beside_the_papers(report: Path) -> None:
+    numbers = json.loads((report / "numbers.json").read_text(encoding="utf-8"))["numbers"]
+    by_name = {n["quantity"]: n for n in numbers if n["run"] == ""}
+    assert by_name["charts"]["paper"] == 750
+    assert abs(by_name["charts"]["here"] - 750) < 75
+    assert (by_name["variables of F"]["paper"], by_name["variables of F"]["here"]) == (19, 12)
+    for symbol, value in (("t of feasible", 3), ("motions s", 1), ("k of relevant", 2)):
+        (row,) = [n for name, n in by_name.items() if symbol in name]
+        assert row["paper"] == row["here"] == value
+    for number in numbers:
+        both = isinstance(number["paper"], int | float) and isinstance(number["here"], int | float)
+        if both and number["paper"] != number["here"]:
+            assert number["why"].endswith(".")
+    climbs = [n for n in numbers if n["quantity"].startswith("local searches that ended")]
+    assert sum(n["here"] for n in climbs if n["quantity"].endswith(("at the global best", "elsewhere"))) == 3 * 200
+    assert all(n["here"] > 0 for n in climbs if n["quantity"].endswith("elsewhere"))
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("width", [1200, 390])
+def test_page_fits_the_window(report: Path, tmp_path: Path, width: int) -> None:
+    browser = find_browser()
+    probe = tmp_path / "probe.html"
+    frame = f'<iframe id="f" src="{(report / "index.html").as_uri()}" style="width:{width}px;height:800px"></iframe>'
+    script = "onload = () => { document.body.dataset.wide = f.contentDocument.documentElement.scrollWidth; }"
+    probe.write_text(f"<body>{frame}<script>{script}</script></body>", encoding="utf-8")
+    flags = [flag for flag in BROWSER_FLAGS if not flag.startswith("--window-size")]
+    run = subprocess.run(
+        [
+            browser,
+            *flags,
+            "--allow-file-access-from-files",
+            f"--user-data-dir={tmp_path / 'profile'}",
+            "--dump-dom",
+            probe.as_uri(),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    measured = re.search(r'data-wide="(\d+)"', run.stdout)
+    assert measured, run.stdout[-500:]
+    assert int(measured.group(1)) <= width
