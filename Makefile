@@ -48,9 +48,9 @@ $(VENV)/.installed: $(VENV)/bin/python $(SOURCES)
 	$(BIN)/python -m pip install .
 	touch $@
 
-$(VENV)/.tools: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet ".[test,lint,stubs]"
-	touch $@
+$(VENV)/.tools: $(VENV)/bin/python $(SOURCES)
+	$(BIN)/python -m pip install ".[test,lint,stubs]"
+	touch $@ $(VENV)/.installed
 
 clean:
 	rm -rf $(VENV) build out
