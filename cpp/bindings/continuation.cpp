@@ -98,6 +98,8 @@ ArrayTable atlas_arrays(const Atlas& atlas) {
     for (int f = 0; f < p.facet_slots(); ++f) facets += p.facet_active(f);
     vertices += p.vertex_count();
   }
+  const py::ssize_t x_size = atlas.system().configuration_size();
+  auto centers = matrix<double>(n, x_size);
   auto bases = py::array_t<double>(std::vector<py::ssize_t>{n, k, v});
   auto residuals = py::array_t<double>(n);
   auto facet_start = py::array_t<std::int64_t>(n + 1), vertex_start = py::array_t<std::int64_t>(n + 1);
@@ -105,9 +107,10 @@ ArrayTable atlas_arrays(const Atlas& atlas) {
   auto offsets = py::array_t<double>(facets);
   auto tags = py::array_t<std::int32_t>(facets);
   auto closed = py::array_t<std::uint8_t>(vertices);
-  std::copy_n(atlas.basis(0), n * k * v, bases.mutable_data());
   py::ssize_t f_at = 0, v_at = 0;
   for (py::ssize_t i = 0; i < n; ++i) {
+    std::copy_n(atlas.center(i), x_size, centers.mutable_data(i, 0));
+    std::copy_n(atlas.basis(i), k * v, bases.mutable_data(i, 0, 0));
     residuals.mutable_at(i) = atlas.residual(i);
     facet_start.mutable_at(i) = f_at;
     vertex_start.mutable_at(i) = v_at;
@@ -132,7 +135,7 @@ ArrayTable atlas_arrays(const Atlas& atlas) {
     *pair++ = b;
   }
   ArrayTable out;
-  out["centers"] = copied(atlas.center(0), n, atlas.system().configuration_size());
+  out["centers"] = centers;
   out["bases"] = bases;
   out["residuals"] = residuals;
   out["facet_start"] = facet_start;

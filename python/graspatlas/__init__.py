@@ -1,7 +1,7 @@
 """Globally best grasps: an atlas of all feasible grasps, and any quality index read on it."""
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+import importlib
+import typing
 
 from graspatlas import motions, patches, quality, systems
 from graspatlas.atlas import Atlas, Closed, Status
@@ -20,7 +20,7 @@ from graspatlas.result import Result, load_result
 from graspatlas.systems import System
 from graspatlas.viewer import export_html, save_picture, view
 
-if TYPE_CHECKING:
+if typing.TYPE_CHECKING:
     from graspatlas.viewer.figures import (
         plot_atlas,
         plot_best_and_worst,
@@ -81,8 +81,8 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> typing.Any:
     """Figures, imported on first use: matplotlib takes longer to import than an atlas to build."""
     if name.startswith("plot_") and name in __all__:
-        return getattr(import_module("graspatlas.viewer.figures"), name)
+        return getattr(importlib.import_module("graspatlas.viewer.figures"), name)
     raise AttributeError(f"module 'graspatlas' has no attribute '{name}'")

@@ -36,6 +36,8 @@ Atlas::Atlas(System& system, const double* x0, const AtlasOptions& options)
       k_(system.dimension()),
       newton_(system, options.newton),
       index_(system.embedding_size()),
+      centers_(x_size_),
+      bases_(k_ * n_),
       x_new_(x0, x0 + x_size_),
       Phi_new_(static_cast<std::size_t>(k_) * n_),
       step_(n_),
@@ -153,8 +155,8 @@ bool Atlas::pass_tests(int i, const double* x_j, const double* Phi_j, double* p_
 
 int Atlas::add_chart() {
   const int j = static_cast<int>(count());
-  centers_.insert(centers_.end(), x_new_.begin(), x_new_.end());
-  bases_.insert(bases_.end(), Phi_new_.begin(), Phi_new_.end());
+  std::copy(x_new_.begin(), x_new_.end(), centers_.add());
+  std::copy(Phi_new_.begin(), Phi_new_.end(), bases_.add());
   residuals_.push_back(newton_.residual());
   polytopes_.emplace_back(k_, half_width(k_, options_.radius));
   cut_by_bounds(j);

@@ -8,6 +8,7 @@
 #include "graspatlas/continuation/neighbours.hpp"
 #include "graspatlas/continuation/newton.hpp"
 #include "graspatlas/continuation/polytope.hpp"
+#include "graspatlas/continuation/rows.hpp"
 #include "graspatlas/continuation/system.hpp"
 
 namespace graspatlas {
@@ -42,8 +43,8 @@ class Atlas {
   std::int64_t open_count() const { return static_cast<std::int64_t>(open_.size()); }
   std::int64_t count() const { return static_cast<std::int64_t>(polytopes_.size()); }
 
-  const double* center(std::int64_t i) const { return &centers_[static_cast<std::size_t>(i) * x_size_]; }
-  const double* basis(std::int64_t i) const { return &bases_[static_cast<std::size_t>(i) * k_ * n_]; }
+  const double* center(std::int64_t i) const { return centers_[static_cast<std::size_t>(i)]; }
+  const double* basis(std::int64_t i) const { return bases_[static_cast<std::size_t>(i)]; }
   double residual(std::int64_t i) const { return residuals_[i]; }
   const Polytope& polytope(std::int64_t i) const { return polytopes_[i]; }
   /// Pairs (i, j), i < j, of charts that cut each other, in the order in which they met.
@@ -68,8 +69,9 @@ class Atlas {
   int x_size_, n_, k_;
   Newton newton_;
   Neighbours index_;
-  std::vector<double> centers_, bases_, residuals_;
-  std::vector<Polytope> polytopes_;
+  Rows centers_, bases_;
+  std::vector<double> residuals_;
+  std::deque<Polytope> polytopes_;
   std::vector<std::array<int, 2>> pairs_;
   std::deque<int> open_;
   std::int64_t projections_ = 0;

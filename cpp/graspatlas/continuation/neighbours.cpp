@@ -10,7 +10,7 @@ namespace {
 constexpr double kLopsided = 0.7;
 }  // namespace
 
-Neighbours::Neighbours(int size) : size_(size) {}
+Neighbours::Neighbours(int size) : size_(size), buckets_(kBucket * size) {}
 
 int Neighbours::new_node() {
   if (free_nodes_.empty()) {
@@ -25,7 +25,7 @@ int Neighbours::new_node() {
 
 int Neighbours::new_bucket() {
   if (free_buckets_.empty()) {
-    points_.resize(points_.size() + static_cast<std::size_t>(kBucket) * size_);
+    buckets_.add();
     numbers_.resize(numbers_.size() + kBucket);
     return static_cast<int>(numbers_.size()) / kBucket - 1;
   }

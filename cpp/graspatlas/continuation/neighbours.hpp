@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "graspatlas/continuation/rows.hpp"
+
 namespace graspatlas {
 
 /// Points of R^size that come one by one, and those within a distance of any point.
@@ -37,10 +39,8 @@ class Neighbours {
     const double* point;
   };
 
-  double* bucket_point(int bucket, int i) { return &points_[(static_cast<std::size_t>(bucket) * kBucket + i) * size_]; }
-  const double* bucket_point(int bucket, int i) const {
-    return &points_[(static_cast<std::size_t>(bucket) * kBucket + i) * size_];
-  }
+  double* bucket_point(int bucket, int i) { return buckets_[bucket] + static_cast<std::size_t>(i) * size_; }
+  const double* bucket_point(int bucket, int i) const { return buckets_[bucket] + static_cast<std::size_t>(i) * size_; }
   int new_node();
   int new_bucket();
   int build(Item* first, Item* last);
@@ -51,8 +51,8 @@ class Neighbours {
 
   int size_, count_ = 0, root_ = -1;
   std::vector<Node> nodes_;
-  std::vector<double> points_;  // of the buckets, kBucket x size each
-  std::vector<int> numbers_;    // of the buckets, kBucket each
+  Rows buckets_;              // a bucket is a row: kBucket points [size]
+  std::vector<int> numbers_;  // of the buckets, kBucket each
   std::vector<int> free_nodes_, free_buckets_;
 };
 
