@@ -12,6 +12,8 @@ from helpers import PythonSphere
 import graspatlas as ga
 from graspatlas.atlas import BOX_TAG, Closed
 from graspatlas.checks import Check, check_atlas, check_result
+from graspatlas.cli import main
+from graspatlas.coverage import measure_coverage
 from graspatlas.systems import Sphere
 
 
@@ -185,3 +187,26 @@ def test_grasps_that_leave_the_hand_motions_fail(bottle, small_result):
     report = check_result(replace(small_result, atlas=atlas, qualities=np.zeros(n), feasible=np.ones(n, bool)))
     failed = [check.claim for check in report.checks if not check.passed]
     assert any("hand motions" in claim for claim in failed)
+
+
+def test_coverage_finds_what_an_unfinished_atlas_leaves_out():
+    system = ga.systems.Sphere(3)
+    whole = ga.build_atlas(system, [1, 0, 0], radius=0.2, epsilon=0.2)
+    found = measure_coverage(whole, system)
+    assert found.points > 250
+    assert found.inside > 0.97
+    assert found.farthest < 0.05
+    part = ga.build_atlas(system, [1, 0, 0], radius=0.2, epsilon=0.2, max_charts=60)
+    assert measure_coverage(part, system).farthest == np.inf
+
+
+def test_check_result_on_the_command_line(bottle_result, tmp_path, capsys):
+    bottle_result.save(tmp_path / "result.npz")
+    assert main(["check-result", str(tmp_path)]) == 0
+    assert "FAIL" not in capsys.readouterr().out
+    moved = bottle_result.atlas.centers.copy()
+    moved[7, 0] += 1e-6
+    replace(bottle_result, atlas=replace(bottle_result.atlas, centers=moved)).save(tmp_path / "result.npz")
+    assert main(["check-result", str(tmp_path)]) == 1
+    assert "FAIL  largest residual" in capsys.readouterr().out
+    assert main(["check-result", str(tmp_path / "nothing")]) == 2

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspatlas.atlas import BOX_TAG, Atlas, Closed
+from graspatlas.coverage import measure_coverage
 from graspatlas.grasps import Grasps
 from graspatlas.quality import INDICES, evaluate
 from graspatlas.requirements import requirement_name, screen
@@ -28,6 +29,8 @@ RESIDUAL_TOLERANCE = 1e-9
 TANGENT_TOLERANCE = 1e-6
 #: How far the half-spaces of two neighbours may be from the bisectors of their centres.
 HALF_SPACE_TOLERANCE = 1e-9
+#: How far a point of the manifold may lie from the nearest polytope, as a share of the chart radius.
+COVERAGE_TOLERANCE = 0.5
 
 
 @dataclass(frozen=True)
@@ -204,6 +207,10 @@ def _result_checks(result: Result) -> Iterator[Check]:
     problem, atlas = result.problem, result.atlas
     system = problem.system(result.dimension)
     yield from _atlas_checks(atlas, system)
+    if atlas.complete:
+        coverage = measure_coverage(atlas, system)
+        claim = f"of {coverage.points} points found without the atlas, the farthest from a chart by, in radii"
+        yield Check(claim, coverage.farthest, COVERAGE_TOLERANCE)
     frozen = problem.frozen_residual(atlas.centers, result.dimension)
     yield Check(
         "frozen hand motions, eq (13), are off by",

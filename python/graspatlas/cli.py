@@ -1,4 +1,4 @@
-"""Command line: graspatlas list, optimize, view, reproduce."""
+"""Command line: graspatlas list, optimize, view, check-result, reproduce."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from graspatlas.result import Result, load_result, writable_folder
 
 __all__ = ["main"]
 
+FAILED = 1
 MISUSE = 2
 INTERRUPTED = 130
 
@@ -34,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: The words after ``graspatlas``; those of the process by default.
 
     Returns:
-        Exit status: 0, 2 for wrong input, 130 when interrupted.
+        Exit status: 0, 1 for a result that fails its checks, 2 for wrong input, 130 when interrupted.
     """
     options = _parser().parse_args(arguments)
     try:
@@ -97,6 +98,10 @@ def _parser() -> argparse.ArgumentParser:
     look.add_argument("--picture", type=Path, metavar="FILE", help="write a PNG picture instead")
     look.add_argument("--no-browser", action="store_true", help="do not open a browser, only say where to look")
     look.set_defaults(run=_view)
+
+    verify = commands.add_parser("check-result", help="verify a result again, from the problem that it carries")
+    verify.add_argument("result", type=Path, help="folder or file that optimize wrote")
+    verify.set_defaults(run=_check_result)
 
     again = commands.add_parser(
         "reproduce", help="run the paper's experiments and write a page to lay beside the paper"
@@ -196,6 +201,12 @@ def _view(options: argparse.Namespace) -> int:
     if not options.html and not options.picture:
         view(result, open_browser=not options.no_browser)
     return 0
+
+
+def _check_result(options: argparse.Namespace) -> int:
+    report = load_result(options.result).check()
+    print(report)
+    return 0 if report else FAILED
 
 
 def _reproduce(options: argparse.Namespace) -> int:
