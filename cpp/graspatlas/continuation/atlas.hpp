@@ -49,7 +49,7 @@ class Atlas {
   const Polytope& polytope(std::int64_t i) const { return polytopes_[i]; }
   /// Pairs (i, j), i < j, of charts that cut each other, in the order in which they met.
   const std::vector<std::array<int, 2>>& neighbour_pairs() const { return pairs_; }
-  /// Attempts that failed and Newton projections made.
+  /// Newton projections made so far, those of failed attempts included.
   std::int64_t projections() const { return projections_; }
 
   const System& system() const { return system_; }
