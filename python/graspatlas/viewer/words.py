@@ -49,8 +49,8 @@ def subtitle(result: Result) -> str:
     unit = "; lengths in mm" if known else ""
     those = ""
     if result.requirements:
-        names = " and ".join(requirement_name(r).split(":")[0].replace("_", " ") for r in result.requirements)
-        those = f"; {result.feasible.sum()} are {names}"
+        names = ", ".join(requirement_name(r).split(":")[0].replace("_", " ") for r in result.requirements)
+        those = f"; {result.feasible.sum()} meet {names}"
     return f"{result.problem.name}: atlas of {result.atlas.n_charts} charts, {result.status}{those}{unit}"
 
 
