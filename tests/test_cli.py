@@ -338,3 +338,14 @@ def test_as_a_program(tmp_path):
     assert_one_line((wrong.returncode, wrong.stdout, wrong.stderr), "did you mean 'schunk_can'?")
     version = subprocess.run([*COMMAND, "--version"], capture_output=True, text=True, check=True)
     assert version.stdout == f"graspatlas {ga.__version__}\n"
+
+
+def test_wrong_words_give_one_line(capsys):
+    for words in (["optimise"], ["optimize", "schunk_can", "--dimension", "two"], ["optimize"], ["list", "--loud"]):
+        with pytest.raises(SystemExit) as ended:
+            main(words)
+        assert ended.value.code == 2
+        error = capsys.readouterr().err
+        assert error.startswith("graspatlas: error: ")
+        assert error.count("\n") == 1
+        assert "--help" in error

@@ -264,7 +264,7 @@ def test_problems_are_checked(can):
     nowhere = replace(can.contacts[0], frame="middle_distl")
     with pytest.raises(ga.GraspAtlasError, match="did you mean 'middle_distal'"):
         replace(can, contacts=(nowhere,))
-    with pytest.raises(ga.GraspAtlasError, match="no default radius"):
+    with pytest.raises(ga.GraspAtlasError, match="no default for radius, epsilon, quality"):
         ga.optimize(replace(can, defaults={"dimension": 2}))
     with pytest.raises(ga.GraspAtlasError, match="frozen at nan"):
         replace(can.contacts[0], frozen={"u": np.nan})

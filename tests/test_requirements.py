@@ -169,7 +169,7 @@ def test_no_grasp_meets_the_requirements(capsys: pytest.CaptureFixture[str]) -> 
     assert result.check()
     from graspatlas.cli import main
 
-    assert main(["optimize", "schunk_can", "--radius", "0.4", "--require", "force_closure:0.5:0.3"]) == 0
+    assert main(["optimize", "schunk_can", "--radius", "0.4", "--require", "force_closure:0.5:0.3"]) == 1
     assert "no best grasp" in capsys.readouterr().out
 
 

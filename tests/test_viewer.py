@@ -370,11 +370,11 @@ def test_picture_has_the_size_asked_for(can_result: ga.Result, tmp_path: Path) -
 @pytest.mark.parametrize("write", [export_html, save_picture])
 def test_a_path_that_cannot_be_written_is_named(can_result: ga.Result, tmp_path: Path, write: object) -> None:
     with pytest.raises(ga.GraspAtlasError, match=r"cannot write.*nowhere"):
-        write(can_result, tmp_path / "nowhere" / "file")  # type: ignore[operator]
-    (tmp_path / "folder").mkdir()
+        write(can_result, tmp_path / "nowhere" / "file.png")  # type: ignore[operator]
+    (tmp_path / "folder.png").mkdir()
     with pytest.raises(ga.GraspAtlasError, match=r"cannot write.*folder"):
-        write(can_result, tmp_path / "folder")  # type: ignore[operator]
-    assert [path.name for path in tmp_path.iterdir()] == ["folder"]
+        write(can_result, tmp_path / "folder.png")  # type: ignore[operator]
+    assert [path.name for path in tmp_path.iterdir()] == ["folder.png"]
 
 
 # Page and live view
@@ -471,3 +471,9 @@ def test_page_renders_in_a_browser(bottle_result: ga.Result, tmp_path: Path) -> 
         assert share(half, "yellow") > 0.02
         assert share(half, "grey") > 0.02
         assert share(half, "red") > 0.0001
+
+
+def test_a_picture_is_a_png(can_result: ga.Result, tmp_path: Path) -> None:
+    with pytest.raises(ga.GraspAtlasError, match=r"must end in \.png"):
+        save_picture(can_result, tmp_path / "can.jpg")
+    assert not list(tmp_path.iterdir())

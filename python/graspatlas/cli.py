@@ -7,7 +7,9 @@ import json
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.optimizer import optimize
 from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.quality import INDICES, quality_name
-from graspatlas.requirements import parse_requirement
+from graspatlas.requirements import REQUIREMENTS, parse_requirement
 from graspatlas.result import Result, load_result, writable_folder
 
 __all__ = ["main"]
@@ -35,7 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: The words after ``graspatlas``; those of the process by default.
 
     Returns:
-        Exit status: 0, 1 for a result that fails its checks, 2 for wrong input, 130 when interrupted.
+        Exit status: 0, 1 where no grasp meets the requirements or a check fails, 2 for wrong input, 130 when
+        interrupted.
     """
     options = _parser().parse_args(arguments)
     try:
@@ -51,15 +54,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line, like all others."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(MISUSE, f"graspatlas: error: {message}; see '{self.prog} --help'\n")
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="graspatlas",
         description="Find the globally best grasp of an object by a robotic hand when the contacts are given.",
     )
     parser.add_argument("--version", action="version", version=f"graspatlas {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    listing = commands.add_parser("list", help="list the bundled problems and the quality indices")
+    listing = commands.add_parser("list", help="list the bundled problems, the quality indices and the requirements")
     listing.set_defaults(run=_list)
 
     best = commands.add_parser("optimize", help="trace all relevant grasps of a problem and find the best one")
@@ -122,6 +132,10 @@ def _list(_: argparse.Namespace) -> int:
     print("quality indices:")
     for name, index in INDICES.items():
         print(f"  {name:26} {(index.__doc__ or '').splitlines()[0]}")
+    print("requirements:")
+    for name, requirement in REQUIREMENTS.items():
+        values = ":".join(field.name.upper() for field in fields(requirement))
+        print(f"  {name}:{values}  {(requirement.__doc__ or '').splitlines()[0]}")
     return 0
 
 
@@ -144,7 +158,9 @@ def _optimize(options: argparse.Namespace) -> int:
         result.save(folder / "result.npz")
         _write_summary(result, folder / "summary.json")
     print(json.dumps(result.summary()) if options.json else _report(result, folder))
-    return INTERRUPTED if result.status is Status.INTERRUPTED else 0
+    if result.status is Status.INTERRUPTED:
+        return INTERRUPTED
+    return 0 if result.feasible.any() else FAILED
 
 
 def _write_summary(result: Result, path: Path) -> None:
@@ -167,7 +183,7 @@ def _report(result: Result, folder: Path | None) -> str:
         lines.append(f"  vertices that no step could leave: {closed}")
     if result.requirements:
         counts = ", ".join(f"{name} refused {count}" for name, count in result.refused.items())
-        lines.append(f"  {result.feasible.sum()} grasps meet the requirements; {counts}")
+        lines.append(f"  {result.feasible.sum()} grasps meet the requirements; asked in turn, {counts}")
     lines += _best_lines(result) if result.feasible.any() else ["  no best grasp: relax a requirement"]
     if not result.is_global:
         lines.append("  the atlas does not cover all grasps: better ones may exist")

@@ -89,6 +89,7 @@ class FirstGrasp:
     parameters: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
+        checked_table(self.joints, "x1's joints", (), None)
         numbers = [
             *self.joints.values(),
             *self.object_xyz,

@@ -84,6 +84,8 @@ def build_atlas(
 
 def _grow(builder: _core.AtlasBuilder, max_charts: int, deadline: float, progress: bool | None) -> Status:
     shown = sys.stderr.isatty() if progress is None else progress
+    # In a file a line every ten seconds is enough.
+    interval = 0.1 if sys.stderr.isatty() else 10.0
     bar = tqdm(
         desc="atlas",
         unit=" charts",
@@ -91,6 +93,7 @@ def _grow(builder: _core.AtlasBuilder, max_charts: int, deadline: float, progres
         delay=_QUIET_SECONDS,
         file=sys.stderr,
         initial=1,
+        mininterval=interval,
     )
     try:
         while not builder.complete:
@@ -103,6 +106,8 @@ def _grow(builder: _core.AtlasBuilder, max_charts: int, deadline: float, progres
             bar.set_postfix(open=builder.n_open, refresh=False)
             bar.update(builder.n_charts - bar.n)
     except KeyboardInterrupt:
+        if shown:
+            print(f"interrupted: keeping {builder.n_charts} charts", file=sys.stderr)
         return Status.INTERRUPTED
     finally:
         bar.close()
@@ -148,7 +153,7 @@ def optimize(
     if not isinstance(problem, Problem):
         raise GraspAtlasError(f"problem must be a graspatlas.Problem, got {type(problem).__name__}; see load_problem")
     chosen = {"dimension": dimension, "radius": radius, "epsilon": epsilon, "quality": quality}
-    options: dict[str, Any] = {key: _chosen(problem, key, value) for key, value in chosen.items()}
+    options = _with_defaults(problem, chosen)
     find_index(options["quality"])
     system = problem.system(options["dimension"])
     atlas = build_atlas(
@@ -176,12 +181,13 @@ def optimize(
     )
 
 
-def _chosen(problem: Problem, key: str, value: Any) -> Any:
-    if value is not None:
-        return value
-    if key not in problem.defaults:
-        raise GraspAtlasError(f"problem '{problem.name}' has no default {key}: give one")
-    return problem.defaults[key]
+def _with_defaults(problem: Problem, chosen: dict[str, Any]) -> dict[str, Any]:
+    """The options chosen, and the problem's defaults for those that are None."""
+    options = {key: problem.defaults.get(key) if value is None else value for key, value in chosen.items()}
+    missing = [key for key, value in options.items() if value is None]
+    if missing:
+        raise GraspAtlasError(f"problem '{problem.name}' has no default for {', '.join(missing)}: give optimize these")
+    return options
 
 
 def _numbers(name: str, value: ArrayLike) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -108,6 +108,16 @@ class Problem:
             )
 
     def _check_x1(self) -> None:
+        slack = self.full_system.slack(self.x1_array)
+        if slack.size and slack.min() < -LIMIT_TOLERANCE:
+            broken = [
+                f"{name} by {-s:.3g}"
+                for name, s in zip(self.full_system.bound_names, slack, strict=True)
+                if s < -LIMIT_TOLERANCE
+            ]
+            raise GraspAtlasError(
+                f"x1 of problem '{self.name}' breaks the {', the '.join(broken)} [rad or length_scale]"
+            )
         arrays = self.full_system.grasp_arrays(self.x1_array[None])
         with np.errstate(over="ignore"):
             gaps = np.linalg.norm(arrays["hand_points"] - arrays["object_points"], axis=2)[0]
@@ -121,16 +131,6 @@ class Problem:
             raise GraspAtlasError(
                 f"x1 of problem '{self.name}' misses its contacts ({rows}); at most {1000 * CONTACT_TOLERANCE:g} mm "
                 f"and {np.degrees(NORMAL_TOLERANCE):.2g} degrees are allowed: correct the object's pose or the joints"
-            )
-        slack = self.full_system.slack(self.x1_array)
-        if slack.size and slack.min() < -LIMIT_TOLERANCE:
-            broken = [
-                f"{name} by {-s:.3g}"
-                for name, s in zip(self.full_system.bound_names, slack, strict=True)
-                if s < -LIMIT_TOLERANCE
-            ]
-            raise GraspAtlasError(
-                f"x1 of problem '{self.name}' breaks the {', the '.join(broken)} [rad or length_scale]"
             )
 
     @cached_property
@@ -164,7 +164,8 @@ class Problem:
         if rank < system.n_equations:
             raise GraspAtlasError(
                 f"the {system.n_equations} contact equations of problem '{self.name}' have rank {rank} at x1: "
-                "a contact is stated twice, or x1 is singular; drop the redundant contact or move x1"
+                "a contact is stated twice, or x1 is a singular posture (symmetric or straight ones often are); drop "
+                "the redundant contact or bend some fingers"
             )
         return system.dimension
 

@@ -63,7 +63,7 @@ def _axes(grasps: Grasps, length_unit: float) -> Array:
 
 @batched
 def inverse_condition_number(grasps: Grasps, length_unit: float = Grasps.LENGTH_UNIT) -> Array:
-    """Smallest over largest semi-axis of the manipulability ellipsoid: 1 is a sphere, 0 a singular grasp.
+    """Smallest over largest semi-axis of the manipulability ellipsoid, lengths in mm; 0 is a singular grasp.
 
     Args:
         grasps: The grasps.
@@ -83,7 +83,9 @@ def inverse_condition_number(grasps: Grasps, length_unit: float = Grasps.LENGTH_
 
 @batched
 def manipulability_volume(grasps: Grasps, length_unit: float = Grasps.LENGTH_UNIT) -> Array:
-    """Product of the semi-axes of the manipulability ellipsoid, proportional to its volume; lengths in mm.
+    """Product of the ellipsoid's semi-axes, translations [mm] and rotations; unbounded near indeterminacy.
+
+    Near a grasp that leaves the object loose, one semi-axis grows without bound: ask for force closure first.
 
     Args:
         grasps: The grasps.
@@ -100,7 +102,7 @@ def manipulability_volume(grasps: Grasps, length_unit: float = Grasps.LENGTH_UNI
 
 @batched
 def smallest_semi_axis(grasps: Grasps, length_unit: float = Grasps.LENGTH_UNIT) -> Array:
-    """Smallest semi-axis of the manipulability ellipsoid; lengths in mm.
+    """Smallest semi-axis of the manipulability ellipsoid, lengths in mm.
 
     Args:
         grasps: The grasps.

@@ -18,7 +18,16 @@ from graspatlas.collision import CollisionChecker
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.grasps import Grasps
 
-__all__ = ["CollisionFree", "ForceClosure", "JointMargin", "Require", "parse_requirement", "requirement_name", "screen"]
+__all__ = [
+    "REQUIREMENTS",
+    "CollisionFree",
+    "ForceClosure",
+    "JointMargin",
+    "Require",
+    "parse_requirement",
+    "requirement_name",
+    "screen",
+]
 
 Flags = NDArray[np.bool_]
 
@@ -118,7 +127,8 @@ class CollisionFree(Requirement):
 
 
 Require = Requirement | Callable[[Any], Any]
-_NAMED: dict[str, type[Requirement]] = {r.name: r for r in (JointMargin, ForceClosure, CollisionFree)}
+#: Requirements by name.
+REQUIREMENTS: dict[str, type[Requirement]] = {r.name: r for r in (JointMargin, ForceClosure, CollisionFree)}
 
 
 def requirement_name(requirement: Require | str) -> str:
@@ -138,17 +148,19 @@ def parse_requirement(text: str) -> Requirement:
         GraspAtlasError: If there is no such requirement, or a value is no number.
     """
     name, *values = text.split(":")
-    if name not in _NAMED:
-        raise unknown_name("requirement", name, _NAMED)
-    attributes = [field.name for field in fields(_NAMED[name])]
+    if name not in REQUIREMENTS:
+        raise unknown_name("requirement", name, REQUIREMENTS)
+    attributes = [field.name for field in fields(REQUIREMENTS[name])]
     if len(values) > len(attributes):
         raise GraspAtlasError(f"requirement {name} has the values {', '.join(attributes)}; got '{text}'")
     try:
-        return _NAMED[name](*map(float, values))
+        return REQUIREMENTS[name](*map(float, values))
     except ValueError as error:
         if isinstance(error, GraspAtlasError):
             raise
-        raise GraspAtlasError(f"requirement '{text}' holds a value that is no number") from None
+        raise GraspAtlasError(
+            f"requirement '{text}' holds a value that is no number; it is {name}:{':'.join(attributes)}"
+        ) from None
 
 
 def screen(requirements: Sequence[Require], grasps: Grasps) -> tuple[Flags, dict[str, int]]:

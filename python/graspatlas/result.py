@@ -209,11 +209,13 @@ def load_result(path: str | os.PathLike[str]) -> Result:
         with open(source, "rb") as stream:
             header, arrays = _read(stream)
     except FileNotFoundError:
-        raise GraspAtlasError(f"result '{source}' does not exist") from None
+        raise GraspAtlasError(
+            f"result '{source}' does not exist; 'graspatlas optimize ... --output FOLDER' writes one"
+        ) from None
     except OSError as error:
         raise GraspAtlasError(f"cannot read result '{source}': {error.strerror or error}") from None
-    except Exception as error:  # a damaged archive fails in many ways, none of which executes anything
-        raise GraspAtlasError(f"'{source}' is damaged or not a graspatlas result ({error}); compute it again") from None
+    except Exception:  # a damaged archive fails in many ways, none of which executes anything
+        raise GraspAtlasError(f"'{source}' is damaged or not a graspatlas result; compute it again") from None
     if header.get("version") != FORMAT_VERSION:
         raise GraspAtlasError(
             f"result '{source}' has version {header.get('version')}, this graspatlas reads {FORMAT_VERSION}"
@@ -284,5 +286,5 @@ def writable_folder(path: str | os.PathLike[str]) -> Path:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise GraspAtlasError(f"cannot write to folder '{folder}': {error.strerror or error}") from None
+        raise GraspAtlasError(f"cannot write to folder '{folder}': {error.strerror or error}; choose another") from None
     return folder

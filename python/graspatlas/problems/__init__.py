@@ -37,7 +37,8 @@ def load_problem(name: str | Path) -> Problem:
         try:
             text = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
-            raise GraspAtlasError(f"cannot read problem file '{path}': {error}") from None
+            reason = getattr(error, "strerror", None) or error
+            raise GraspAtlasError(f"cannot read problem file '{path}': {reason}; correct the path") from None
         folder = path.parent
     try:
         data = json.loads(text)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
+from graspatlas.errors import GraspAtlasError
 from graspatlas.result import Result
 
 if TYPE_CHECKING:
@@ -73,6 +74,8 @@ def save_picture(result: Result, path: str | os.PathLike[str], *, width: int = 1
     from graspatlas.viewer.picture import check_size, draw
     from graspatlas.viewer.scene import Scene
 
+    if os.path.splitext(path)[1].lower() != ".png":
+        raise GraspAtlasError(f"a picture's name must end in .png, not '{os.fspath(path)}'")
     check_size(width, height)
     with replaced(path) as stream:
         draw(Scene(result), width, height).save(stream, "PNG")

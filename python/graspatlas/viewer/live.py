@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import io
+import signal
 import sys
+import threading
 import time
 import warnings
 from typing import TYPE_CHECKING, Any
@@ -32,6 +34,7 @@ def show(result: Result, *, open_browser: bool, wait: bool) -> meshcat.Visualize
             visualizer.open()
         if wait:
             print("press Ctrl-C to end", file=sys.stderr)
+            _end_with_us()
             _serve(visualizer)
     except KeyboardInterrupt:
         close(visualizer)
@@ -71,6 +74,12 @@ def _start() -> meshcat.Visualizer:
         raise GraspAtlasError(
             f"meshcat's server does not start: {error}; export_html writes a page that needs no server"
         ) from None
+
+
+def _end_with_us() -> None:
+    """Let a request to terminate end the server too, as Ctrl-C does."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 def _serve(visualizer: meshcat.Visualizer) -> None:
