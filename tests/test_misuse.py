@@ -363,6 +363,16 @@ def test_a_broken_hand_is_reported_without_noise(capfd):
     assert (out, err) == ("", "")
 
 
+def test_contacts_on_joints_that_do_not_exist(can):
+    model = _core.Model(can.hand.urdf, "none")
+    frozen = _core.PatchParameter(False, 0.0, False, -1.0, 1.0)
+    lower, upper = can.hand.joint_limits
+    for joint in (-1, 99):
+        side = _core.ContactSide(joint, np.eye(4), _core.PlanePatch(np.eye(4)), frozen, frozen)
+        with pytest.raises(ga.GraspAtlasError, match=f"joint {joint}, the model has 14"):
+            _core.GraspSystem(model, [(side, side)], np.eye(13), 0.01, list(lower), list(upper))
+
+
 def test_wrong_arguments_of_compiled_parts(can):
     with pytest.raises(ga.GraspAtlasError, match="object's joint"):
         _core.Model(can.hand.urdf, "ball")

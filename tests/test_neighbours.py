@@ -14,7 +14,7 @@ from graspatlas._core import Neighbours
 def fill(points: np.ndarray) -> Neighbours:
     tree = Neighbours(points.shape[1])
     for point in points:
-        tree.insert(point, points.shape[1])
+        tree.insert(point)
     return tree
 
 
@@ -50,7 +50,7 @@ def test_equals_brute_force(seed, size, count, kind, distance):
         squared = ((points - query) ** 2).sum(axis=1)
         expected = np.flatnonzero(squared <= distance**2)
         unsure = np.flatnonzero(np.abs(squared - distance**2) < 1e-12)
-        got = tree.within(query, distance, size)
+        got = tree.within(query, distance)
         assert got == sorted(set(got))
         assert set(got) ^ set(expected.tolist()) <= set(unsure.tolist())
 
@@ -62,15 +62,15 @@ def test_search_while_points_come():
     for i, point in enumerate(points):
         if i % 50 == 0:
             near = np.flatnonzero(((points[:i] - point) ** 2).sum(axis=1) <= 0.25)
-            assert tree.within(point, 0.5, 4) == near.tolist()
-        tree.insert(point, 4)
+            assert tree.within(point, 0.5) == near.tolist()
+        tree.insert(point)
 
 
 def test_empty_and_wrong_input():
     tree = Neighbours(3)
-    assert tree.within([0.0, 0.0, 0.0], 1e9, 3) == []
+    assert tree.within([0.0, 0.0, 0.0], 1e9) == []
     with pytest.raises(ga.GraspAtlasError, match="point must hold 3"):
-        tree.insert([0.0, 0.0], 3)
+        tree.insert([0.0, 0.0])
 
 
 def pair_displacements(atlas: ga.Atlas) -> list[tuple[int, int, np.ndarray]]:

@@ -250,18 +250,16 @@ void bind_parts(py::module_& module) {
   py::class_<Neighbours>(module, "Neighbours", "Points that come one by one, and those within a distance of any point.")
       .def(py::init<int>(), py::arg("size"))
       .def(
-          "insert",
-          [](Neighbours& t, const DoubleArray& point, int size) { t.insert(checked_vector(point, size, "point")); },
-          py::arg("point"), py::arg("size"), "Add a point [size].")
+          "insert", [](Neighbours& t, const DoubleArray& point) { t.insert(checked_vector(point, t.size(), "point")); },
+          py::arg("point"), "Add a point [size].")
       .def(
           "within",
-          [](const Neighbours& t, const DoubleArray& point, double distance, int size) {
+          [](const Neighbours& t, const DoubleArray& point, double distance) {
             std::vector<int> out;
-            t.within(checked_vector(point, size, "point"), distance, out);
+            t.within(checked_vector(point, t.size(), "point"), distance, out);
             return out;
           },
-          py::arg("point"), py::arg("distance"), py::arg("size"),
-          "Numbers of the points within a distance, ascending.");
+          py::arg("point"), py::arg("distance"), "Numbers of the points within a distance, ascending.");
 }
 
 }  // namespace

@@ -178,11 +178,7 @@ class Neighbours:
     Points that come one by one, and those within a distance of any point.
     """
     def __init__(self, size: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def insert(
-        self,
-        point: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        size: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None:
+    def insert(self, point: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         """
         Add a point [size].
         """
@@ -190,7 +186,6 @@ class Neighbours:
         self,
         point: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         distance: typing.SupportsFloat | typing.SupportsIndex,
-        size: typing.SupportsInt | typing.SupportsIndex,
     ) -> list[int]:
         """
         Numbers of the points within a distance, ascending.

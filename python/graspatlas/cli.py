@@ -220,7 +220,9 @@ def _view(options: argparse.Namespace) -> int:
 
 
 def _check_result(options: argparse.Namespace) -> int:
-    report = load_result(options.result).check()
+    result = load_result(options.result)
+    report = result.check()
+    print(f"{result.problem.name}: {result.atlas.n_charts} charts, {result.status}")
     print(report)
     return 0 if report else FAILED
 

@@ -22,6 +22,7 @@ class Neighbours {
   /// Numbers of all points within `distance` of `point`, ascending, into `out`.
   void within(const double* point, double distance, std::vector<int>& out) const;
 
+  int size() const { return size_; }
   int count() const { return count_; }
 
  private:

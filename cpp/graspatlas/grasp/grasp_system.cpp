@@ -87,7 +87,11 @@ GraspSystem::GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> cont
                 std::to_string(model_->hand_v_size()) + " joint velocities");
   if (!(length_scale > 0.0) || !std::isfinite(length_scale))
     throw Error("length_scale must be positive, got " + to_text(length_scale));
+  const int joints = model_->joint_count();
   visit_sides(contacts_, [&](const ContactSide& side) {
+    if (side.joint < 0 || side.joint >= joints)
+      throw Error("a contact sits on joint " + std::to_string(side.joint) + ", the model has " +
+                  std::to_string(joints));
     if (side.u.free) parameters_.push_back({&side.u, side.patch->u_is_angle()});
     if (side.v.free) parameters_.push_back({&side.v, false});
   });

@@ -35,6 +35,7 @@ class Model {
 
   int q_size() const;
   int v_size() const;
+  int joint_count() const { return static_cast<int>(placements_.size()); }  ///< the base, 0, included
   int hand_q_size() const { return hand_q_size_; }
   int hand_v_size() const { return hand_v_size_; }
   int object_joint() const { return object_joint_; }  ///< -1 without an object

@@ -44,4 +44,7 @@ def load_problem(name: str | Path) -> Problem:
         data = json.loads(text)
     except json.JSONDecodeError as error:
         raise GraspAtlasError(f"problem file '{name}' is not JSON: {error}") from None
-    return Problem.from_dict(data, folder)
+    try:
+        return Problem.from_dict(data, folder)
+    except GraspAtlasError as error:
+        raise GraspAtlasError(f"problem file '{name}': {error}") from None
