@@ -349,3 +349,8 @@ def test_wrong_words_give_one_line(capsys):
         assert error.startswith("graspatlas: error: ")
         assert error.count("\n") == 1
         assert "--help" in error
+
+
+def test_part_of_a_name_finds_it(capsys):
+    assert main(["optimize", "schunk_can", "--quality", "volum"]) == 2
+    assert "did you mean 'manipulability_volume'" in capsys.readouterr().err

@@ -24,6 +24,7 @@ def unknown_name(kind: str, name: object, known: Iterable[str], place: str = "")
     """
     names = sorted(known)
     near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
+    near = near or [known_name for known_name in names if len(str(name)) > 2 and str(name) in known_name]
     where = f"not {place}" if place else "unknown"
     hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(names) or 'none'}"
     return GraspAtlasError(f"{kind} '{name}' is {where}; {hint}")
