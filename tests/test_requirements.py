@@ -161,6 +161,11 @@ def test_refusals_are_counted_cheapest_first() -> None:
     assert min((q - lower).min(), (upper - q).min()) >= 0.05
 
 
+def test_continuous_joints_have_no_limits_to_keep_from() -> None:
+    result = ga.optimize(ga.load_problem("planar_hand"), require=[ga.JointMargin(0.5)])
+    assert result.feasible.all()
+
+
 def test_no_grasp_meets_the_requirements(capsys: pytest.CaptureFixture[str]) -> None:
     result = ga.optimize(ga.load_problem("schunk_can"), radius=0.4, require=[ga.ForceClosure(FRICTION, 0.3)])
     assert not result.feasible.any()

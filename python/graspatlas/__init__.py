@@ -15,6 +15,7 @@ from graspatlas.optimizer import build_atlas, optimize
 from graspatlas.problem import Problem
 from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.quality import batched
+from graspatlas.refinement import Refinement, refine
 from graspatlas.requirements import CollisionFree, ForceClosure, JointMargin
 from graspatlas.result import Result, load_result
 from graspatlas.systems import System
@@ -51,6 +52,7 @@ __all__ = [
     "JointMargin",
     "Peak",
     "Problem",
+    "Refinement",
     "Result",
     "Status",
     "System",
@@ -75,6 +77,7 @@ __all__ = [
     "plot_planar_grasp",
     "plot_planar_indices",
     "quality",
+    "refine",
     "save_picture",
     "systems",
     "view",

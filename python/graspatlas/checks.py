@@ -17,6 +17,7 @@ from graspatlas.requirements import requirement_name, screen
 from graspatlas.systems import AnySystem
 
 if TYPE_CHECKING:
+    from graspatlas.refinement import Refinement
     from graspatlas.result import Result
 
 __all__ = ["Check", "CheckReport", "check_atlas", "check_result"]
@@ -242,3 +243,28 @@ def _result_checks(result: Result) -> Iterator[Check]:
             if not isinstance(requirement, str):
                 met, _ = screen([requirement], winner)
                 yield Check(f"the best grasp fails requirement {requirement_name(requirement)}", float(not met[0]), 0.0)
+    if result.refinement is not None:
+        yield from _refinement_checks(result, result.refinement)
+
+
+def _refinement_checks(result: Result, refinement: Refinement) -> Iterator[Check]:
+    """The local maxima are grasps of the system, meet the requirements, and none is worse than its chart."""
+    problem = result.problem
+    system = problem.full_system if refinement.all_motions else problem.system(result.dimension)
+    residuals = [np.abs(system.evaluate_residual(x)).max(initial=0.0) for x in refinement.x]
+    yield Check("largest residual of a refined grasp", float(np.max(residuals)), RESIDUAL_TOLERANCE)
+    slacks = [system.slack(x).min(initial=np.inf) for x in refinement.x]
+    yield Check("farthest that a refined grasp lies outside its bounds", float(-np.min(slacks)), RESIDUAL_TOLERANCE)
+    if not refinement.all_motions:
+        frozen = float(np.abs(problem.frozen_residual(refinement.x, result.dimension)).max(initial=0.0))
+        yield Check("frozen hand motions of the refined grasps are off by", frozen, RESIDUAL_TOLERANCE)
+    grasps = Grasps(problem, refinement.x, system)
+    if result.quality in INDICES:
+        again = evaluate(result.quality, grasps)
+        error = np.abs(again - refinement.qualities) / np.maximum(np.abs(again), 1e-12)
+        yield Check("refined qualities differ from a new evaluation by, relatively", float(error.max()), 1e-6)
+    loss = float(result.best.quality - refinement.qualities.max())
+    yield Check("the refined best is worse than the best chart by", loss, 0.0)
+    known = [r for r in result.requirements if not isinstance(r, str)]
+    met, _ = screen(known, grasps)
+    yield Check("refined grasps that fail a requirement", float((~met).sum()), 0.0)

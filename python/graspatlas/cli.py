@@ -87,7 +87,12 @@ def _parser() -> argparse.ArgumentParser:
         metavar="E",
         help="how different neighbouring charts may be, 0 to 1",
     )
-    best.add_argument("--quality", metavar="NAME", help=f"quality index: {', '.join(INDICES)}")
+    best.add_argument(
+        "--quality",
+        action="append",
+        metavar="NAME",
+        help=f"quality index; may be given several times, the first chooses the best: {', '.join(INDICES)}",
+    )
     best.add_argument(
         "--require",
         action="append",
@@ -95,6 +100,16 @@ def _parser() -> argparse.ArgumentParser:
         metavar="NAME[:VALUE...]",
         help="requirement that the best grasp must meet, such as collision_free, force_closure:0.5:0.02 (friction, "
         "margin) or joint_margin:0.05; may be given several times",
+    )
+    best.add_argument(
+        "--refine",
+        nargs="?",
+        const="relevant",
+        choices=("relevant", "feasible"),
+        default=False,
+        metavar="WHERE",
+        help="climb to the maximum between the charts' centres: among the relevant grasps, or with 'feasible' on among "
+        "all feasible ones, no hand motion frozen",
     )
     best.add_argument("--max-charts", type=int, metavar="N", help="cut the atlas short after N charts")
     best.add_argument("--max-seconds", type=float, metavar="S", help="cut the atlas short after S seconds")
@@ -150,6 +165,7 @@ def _optimize(options: argparse.Namespace) -> int:
         epsilon=options.epsilon,
         quality=options.quality,
         require=require,
+        refine=options.refine,
         max_charts=options.max_charts,
         max_seconds=options.max_seconds,
         progress=True,
@@ -185,6 +201,8 @@ def _report(result: Result, folder: Path | None) -> str:
         counts = ", ".join(f"{name} refused {count}" for name, count in result.refused.items())
         lines.append(f"  {result.feasible.sum()} grasps meet the requirements; asked in turn, {counts}")
     lines += _best_lines(result) if result.feasible.any() else ["  no best grasp: relax a requirement"]
+    if result.refinement:
+        lines += _refined_lines(result)
     if not result.is_global:
         lines.append("  the atlas does not cover all grasps: better ones may exist")
     if folder:
@@ -197,7 +215,25 @@ def _best_lines(result: Result) -> list[str]:
     values = f"best {best.quality:.6g}, worst {result.worst.quality:.6g}, first grasp {result.at_x1.quality:.6g}"
     pose = f"object at {_row(best.object_xyz)} m, quaternion xyzw {_row(best.object_quat_xyzw)}"
     angles = [f"    {joint:20} {value:9.4f}" for joint, value in best.joint_positions.items()]
-    return [f"  {name}: {values}", f"  best grasp (chart {best.chart}): {pose}, joints [rad or m]:", *angles]
+    others = [f"  {name}: {values[best.chart]:.6g} at the best grasp" for name, values in result.others.items()]
+    return [f"  {name}: {values}", *others, f"  best grasp (chart {best.chart}): {pose}, joints [rad or m]:", *angles]
+
+
+def _refined_lines(result: Result) -> list[str]:
+    refinement, best = result.refinement, result.refined_best
+    assert refinement is not None
+    where = "all feasible grasps" if refinement.all_motions else "the relevant grasps"
+    peaks = f"{refinement.n_peaks} local maxima" if refinement.n_peaks > 1 else "one local maximum"
+    lines = [
+        f"  refined best {best.quality:.9g} ({100.0 * result.gain:+.3g} %), the highest of {peaks} among {where}:",
+        f"    object at {_row(best.object_xyz)} m, quaternion xyzw {_row(best.object_quat_xyzw)}, joints [rad or m]:",
+        *(f"    {joint:20} {value:9.4f}" for joint, value in best.joint_positions.items()),
+    ]
+    if not refinement.converged[0]:
+        lines.append("    still rising when the climb was given up: the index may have no maximum there")
+    if not refinement.complete:
+        lines.append("    interrupted: local maxima may be missing")
+    return lines
 
 
 def _row(values: NDArray[np.float64]) -> str:

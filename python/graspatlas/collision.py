@@ -17,6 +17,8 @@ __all__ = ["CollisionChecker"]
 
 #: Before the names of the object's shapes.
 OBJECT = "object/"
+#: Distances are as exact as this, so that optimisers can differentiate them; depths are not [m].
+DISTANCE_TOLERANCE = 1e-10
 
 
 class CollisionChecker:
@@ -50,6 +52,9 @@ class CollisionChecker:
             request = coal.CollisionRequest()
             request.security_margin = -touch_depth if touches else clearance
             self._geometry_data.collisionRequests[i] = request
+            self._geometry_data.distanceRequests[i].gjk_tolerance = DISTANCE_TOLERANCE
+        pairs = range(len(self._geometry.collisionPairs))
+        self._required = np.array([self._geometry_data.collisionRequests[i].security_margin for i in pairs])
 
     def first_collision(self, x: ArrayLike) -> tuple[str, str] | None:
         """Names of the first two shapes found in collision at a grasp, or None.
@@ -77,6 +82,22 @@ class CollisionChecker:
         model, data, geometry, geometry_data = self._model, self._data, self._geometry, self._geometry_data
         rows = np.ascontiguousarray(np.asarray(X, float)[:, : model.nq])
         return np.array([not compute(model, data, geometry, geometry_data, q, True) for q in rows], bool)
+
+    def clearances(self, X: ArrayLike, pairs: ArrayLike | None = None) -> NDArray[np.float64]:
+        """Distance of each pair of shapes, less the distance that it must keep; negative in collision [n, p], metres.
+
+        Args:
+            X: One grasp a row [n, configuration_size].
+            pairs: Numbers of the pairs [p], in the order of the collision geometry; all by default.
+        """
+        chosen = np.arange(len(self._required)) if pairs is None else np.asarray(pairs, int)
+        rows = np.ascontiguousarray(np.asarray(X, float)[:, : self._model.nq])
+        data, geometry_data, distance = self._data, self._geometry_data, self._pin.computeDistance
+        out = np.empty((len(rows), len(chosen)))
+        for row, q in zip(out, rows, strict=True):
+            self._pin.updateGeometryPlacements(self._model, data, self._geometry, geometry_data, q)
+            row[:] = [distance(self._geometry, geometry_data, int(pair)).min_distance for pair in chosen]
+        return np.asarray(out - self._required[chosen])
 
 
 def _joined(problem: Problem) -> tuple[Any, Any]:

@@ -233,9 +233,15 @@ class Hand(Body):
 
     @cached_property
     def joint_limits(self) -> tuple[Array, Array]:
-        """Lower and upper limits [nq each], the URDF's where `limits` does not replace them."""
+        """Lower and upper limits [nq each], the URDF's where `limits` does not replace them.
+
+        Continuous joints, whose cosine and sine stand in q, have infinite ones.
+        """
         lower, upper = np.array(self.model.lower_limits), np.array(self.model.upper_limits)
         for joint in self.model.hand_joints:
+            if joint.q_size == 2:
+                lower[joint.q_index : joint.q_index + 2] = -np.inf
+                upper[joint.q_index : joint.q_index + 2] = np.inf
             if joint.name in self.limits:
                 lower[joint.q_index], upper[joint.q_index] = self.limits[joint.name]
         return lower, upper

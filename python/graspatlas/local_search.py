@@ -12,9 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -22,8 +23,12 @@ from scipy.sparse.csgraph import connected_components
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasps
-from graspatlas.quality import evaluate
-from graspatlas.result import Result
+from graspatlas.quality import Quality, evaluate
+from graspatlas.requirements import Require, Requirement, screen
+
+if TYPE_CHECKING:
+    from graspatlas.problem import Problem
+    from graspatlas.result import Result
 
 __all__ = ["Climb", "Peak", "climb", "local_maxima", "peaks_of"]
 
@@ -36,8 +41,10 @@ MAX_STEPS = 200
 SMALLEST_REACH = 1e-3
 #: What counts as better, relative to the quality.
 LEAST_GAIN = 1e-7
-#: How far inside its bounds a climb stays, as a share of the chart radius.
+#: How far inside its bounds and requirements a climb stays, as a share of the reach.
 MARGIN = 1e-6
+#: Shares of the optimiser's step that are tried: requirements may have been seen too late.
+SHARES = np.array([1.0, 0.99, 0.9, 0.6, 0.3, 0.1])
 #: How far a point may be outside its bounds [units of the tangent space].
 BOUND_TOLERANCE = 1e-9
 #: Step of the differences, as a share of the reach.
@@ -78,7 +85,7 @@ class Climb:
     """One run of the local optimiser.
 
     Attributes:
-        chart: Chart at whose centre it started.
+        chart: Chart at whose centre it started; -1 when it started elsewhere.
         x: Where it ended [configuration_size].
         qualities: The index at the start and after each step; never decreasing.
         converged: False when it was given up after the largest number of steps.
@@ -100,100 +107,156 @@ class Climb:
         return len(self.qualities) - 1
 
 
-def climb(result: Result, chart: int, *, max_steps: int = MAX_STEPS) -> Climb:
-    """Climb from a chart's centre to a local maximum of the index, on the manifold and within its bounds.
+def climb(result: Result, start: int | ArrayLike, *, all_motions: bool = False, max_steps: int = MAX_STEPS) -> Climb:
+    """Climb to a local maximum of the index, on the manifold, within its bounds and the result's requirements.
 
-    In the tangent space of the current grasp, SLSQP of SciPy maximises the index of the projected point over the k
+    In the tangent space of the current grasp, SLSQP of SciPy maximises the index of the projected point over the
     tangent coordinates, in a box as wide as the chart radius. Its result becomes the next grasp if it is better; if
     not, the best of a ring of points does; if none is better, the box shrinks. The climb ends when the box is a
-    thousandth of the radius. The result's requirements play no part.
+    thousandth of the radius.
 
     Args:
         result: The result; its index may be any callable.
-        chart: Where to start.
+        start: Number of the chart at whose centre to start, or a grasp [configuration_size].
+        all_motions: Climb in all t dimensions of F, no hand motion frozen, instead of in R.
         max_steps: Steps after which the climb is given up: an index without bound is climbed for ever.
 
     Returns:
         The climb.
 
     Raises:
-        GraspAtlasError: If there is no such chart, or the index fails.
+        GraspAtlasError: If there is no such chart, the start does not meet the requirements, or the index fails.
     """
-    if not 0 <= chart < result.atlas.n_charts:
-        raise GraspAtlasError(f"chart {chart} does not exist; the atlas has charts 0 to {result.atlas.n_charts - 1}")
     if isinstance(max_steps, bool) or not isinstance(max_steps, int | np.integer) or max_steps < 1:
         raise GraspAtlasError(f"max_steps must be a whole number of at least 1, got {max_steps!r}")
-    radius = result.atlas.radius
-    x, value, reach = result.atlas.centers[chart], float(result.qualities[chart]), radius
+    hill = _Hill.of(result, all_motions)
+    chart, x = _start(result, start)
+    if not hill.meets(x):
+        name = f"chart {chart}" if chart >= 0 else "the grasp"
+        raise GraspAtlasError(f"{name} does not meet the requirements; start from one that does, see result.feasible")
+    value = float(evaluate(result.quality, hill.grasps(x))[0])
+    reach = hill.radius
     qualities = [value]
-    while reach > SMALLEST_REACH * radius and len(qualities) <= max_steps:
-        place = _Surroundings(result, x, value, reach)
+    while reach > SMALLEST_REACH * hill.radius and len(qualities) <= max_steps:
+        place = _Surroundings(hill, x, value, reach)
         better = place.optimised() or place.best_of_ring()
         if better is None:
             reach *= 0.3
             continue
         x, value = better
         qualities.append(value)
-    return Climb(int(chart), x, np.array(qualities), reach <= SMALLEST_REACH * radius)
+    return Climb(chart, x, np.array(qualities), reach <= SMALLEST_REACH * hill.radius)
+
+
+def _start(result: Result, start: int | ArrayLike) -> tuple[int, Array]:
+    """Chart and grasp that a climb starts from; chart -1 for a grasp that was given."""
+    atlas = result.atlas
+    if isinstance(start, int | np.integer) and not isinstance(start, bool):
+        if not 0 <= start < atlas.n_charts:
+            raise GraspAtlasError(f"chart {start} does not exist; the atlas has charts 0 to {atlas.n_charts - 1}")
+        return int(start), atlas.centers[start]
+    x = np.asarray(start, float)
+    if x.shape != (atlas.system.configuration_size,) or not np.isfinite(x).all():
+        raise GraspAtlasError(
+            f"a climb starts from the number of a chart or a grasp of {atlas.system.configuration_size} numbers, "
+            f"got {start!r}"
+        )
+    return -1, x
+
+
+@dataclass(frozen=True)
+class _Hill:
+    """What is climbed: the index over the grasps of a system that meet the requirements."""
+
+    problem: Problem
+    system: _core.GraspSystem
+    quality: Quality
+    requirements: tuple[Require, ...]
+    radius: float
+
+    @classmethod
+    def of(cls, result: Result, all_motions: bool) -> _Hill:
+        unknown = [r for r in result.requirements if isinstance(r, str)]
+        if unknown:
+            raise GraspAtlasError(
+                f"requirement '{unknown[0]}' is a function, which files do not keep: compute the result again"
+            )
+        system = result.problem.full_system if all_motions else result.problem.system(result.dimension)
+        return cls(result.problem, system, result.quality, tuple(result.requirements), result.atlas.radius)  # type: ignore[arg-type]
+
+    def grasps(self, X: ArrayLike) -> Grasps:
+        return Grasps(self.problem, X, self.system)
+
+    def meets(self, x: Array) -> bool:
+        return bool(screen(self.requirements, self.grasps(x))[0][0])
 
 
 class _Surroundings:
-    """The tangent space of a grasp x, in coordinates w [k] between -1 and 1, and the index of the points above it."""
+    """The tangent space of a grasp x, in coordinates w [k] between -1 and 1, and the points of the manifold above it.
 
-    def __init__(self, result: Result, x: Array, value: float, reach: float) -> None:
-        self.result, self.x, self.value, self.reach = result, x, value, reach
-        self.system = result.atlas.system
-        J = self.system.evaluate_jacobian(x)
+    What optimisers ask for is the gain, by how much better than x a point is, relatively; and its slacks, all positive
+    inside: those of the bounds and of the requirements that are near.
+    """
+
+    def __init__(self, hill: _Hill, x: Array, value: float, reach: float) -> None:
+        self.hill, self.x, self.value, self.reach = hill, x, value, reach
+        J = hill.system.evaluate_jacobian(x)
         self.Phi = np.ascontiguousarray(np.linalg.svd(J)[2][len(J) :])
-        self.margin = MARGIN * result.atlas.radius
-        B = self.system.bound_normals
-        self.near = self.system.slack(x) < 2.0 * reach * np.sqrt(len(self.Phi)) * np.linalg.norm(B, axis=1)
-        self.slopes = -reach * B[self.near] @ self.Phi.T
+        B = hill.system.bound_normals
+        self.near = hill.system.slack(x) < 2.0 * reach * np.sqrt(len(self.Phi)) * np.linalg.norm(B, axis=1)
+        here = hill.grasps(x)
+        named = [r.slacks_near(here) for r in hill.requirements if isinstance(r, Requirement)]
+        self.required = [slacks for slacks in named if slacks is not None]
         self.scale = max(abs(value), 1e-12)
+        self._seen: dict[bytes, tuple[Array, Array]] = {}
 
     def point(self, w: Array) -> Array | None:
         """Point of the manifold above w, eqs (14) and (15)."""
-        x = _core.project(self.system, self.x, self.Phi, self.reach * np.asarray(w))
+        x = _core.project(self.hill.system, self.x, self.Phi, self.reach * np.asarray(w))
         return None if x is None else np.asarray(x)
 
-    def gains(self, W: Array) -> Array:
-        """How much better than x the points above W [n, k] are, relatively [n]; -1 where there is none."""
+    def look(self, W: Array) -> tuple[Array, Array]:
+        """Gains [n] and slacks [n, c] of the points above W [n, k]; -1 where there is none."""
+        key = W.tobytes()
+        if key not in self._seen:
+            self._seen[key] = self._look(W)
+        return self._seen[key]
+
+    def _look(self, W: Array) -> tuple[Array, Array]:
         points = [self.point(w) for w in W]
-        found = [p for p in points if p is not None]
-        gains = np.full(len(W), -1.0)
-        if found:
-            grasps = Grasps(self.result.problem, found, self.system)  # type: ignore[arg-type]
-            values = evaluate(self.result.quality, grasps)
-            gains[[p is not None for p in points]] = (values - self.value) / self.scale
-        return gains
+        there = np.array([p is not None for p in points])
+        rows = [p for p in points if p is not None] or [self.x]
+        grasps = self.hill.grasps(np.array(rows))
+        values = (evaluate(self.hill.quality, grasps) - self.value) / self.scale
+        bounds = np.array([self.hill.system.slack(p)[self.near] for p in rows]) / self.reach
+        inside = np.hstack([bounds, *(slacks(grasps) / self.reach for slacks in self.required)]) - MARGIN
+        gains, slacks = np.full(len(W), -1.0), np.full((len(W), inside.shape[1]), -1.0)
+        gains[there], slacks[there] = values[: there.sum()], inside[: there.sum()]
+        return gains, slacks
 
-    def slope(self, w: Array) -> Array:
-        """Derivative of the gain by w [k], by central differences."""
+    def slopes(self, w: Array) -> tuple[Array, Array]:
+        """Derivatives by w of the gain [k] and the slacks [c, k], by central differences."""
         h = DIFFERENCE * np.eye(len(w))
-        gains = self.gains(np.concatenate([w + h, w - h]))
-        return np.asarray((gains[: len(w)] - gains[len(w) :]) / (2.0 * DIFFERENCE))
-
-    def inside(self, w: Array) -> Array:
-        """Distance of the point above w from each bound that is near, less the margin."""
-        x = self.point(w)
-        if x is None:
-            return np.full(int(self.near.sum()), -1.0)
-        return np.asarray(self.system.slack(x)[self.near] - self.margin)
+        gains, slacks = self.look(np.concatenate([w + h, w - h]))
+        k = len(w)
+        step = 2.0 * DIFFERENCE
+        return (gains[:k] - gains[k:]) / step, (slacks[:k] - slacks[k:]).T / step
 
     def optimised(self) -> tuple[Array, float] | None:
-        """What SLSQP finds, if it is better."""
+        """What SLSQP finds, or something on the way there, if it is better."""
         k = len(self.Phi)
-        limits = {"type": "ineq", "fun": self.inside, "jac": lambda w: self.slopes}
+        limits = {"type": "ineq", "fun": lambda w: self.look(w[None])[1][0], "jac": lambda w: self.slopes(w)[1]}
         found = minimize(
-            lambda w: -float(self.gains(w[None])[0]),
+            lambda w: -float(self.look(w[None])[0][0]),
             np.zeros(k),
-            jac=lambda w: -self.slope(w),
+            jac=lambda w: -self.slopes(w)[0],
             method="SLSQP",
             bounds=[(-1.0, 1.0)] * k,
-            constraints=[limits] if self.near.any() else [],
+            constraints=[limits] if self.near.any() or self.required else [],
             options={"maxiter": 8, "ftol": 1e-10},
         )
-        return self._better(np.asarray(found.x)[None]) if np.isfinite(found.x).all() else None
+        w = np.asarray(found.x)
+        return self._better(SHARES[:, None] * w) if np.isfinite(w).all() else None
 
     def best_of_ring(self) -> tuple[Array, float] | None:
         """The best of some points at distance 1, if it is better."""
@@ -204,14 +267,15 @@ class _Surroundings:
         return self._better(W / np.linalg.norm(W, axis=1, keepdims=True))
 
     def _better(self, W: Array) -> tuple[Array, float] | None:
-        """The best of the points above W that lie within the bounds, and its quality, if that is better."""
-        gains = self.gains(W)
-        for row in np.argsort(-gains):
+        """The best of the points above W that meet everything, and its quality, if that is better."""
+        gains, slacks = self.look(W)
+        for row in np.argsort(-gains, kind="stable"):
             if gains[row] < LEAST_GAIN:
                 return None
-            x = self.point(W[row])
-            if x is not None and self.system.slack(x).min(initial=0.0) >= -BOUND_TOLERANCE:
-                return x, self.value + float(gains[row]) * self.scale
+            x = self.point(W[row]) if (slacks[row] > -MARGIN).all() else None
+            if x is None or self.hill.system.slack(x).min(initial=0.0) < -BOUND_TOLERANCE or not self.hill.meets(x):
+                continue
+            return x, self.value + float(gains[row]) * self.scale
         return None
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from numbers import Integral, Real
 from typing import Any
 
@@ -17,7 +18,8 @@ from graspatlas.atlas import Atlas, Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasps
 from graspatlas.problem import Problem
-from graspatlas.quality import Quality, evaluate, find_index
+from graspatlas.quality import Quality, evaluate, find_index, quality_name
+from graspatlas.refinement import refine as climb_peaks
 from graspatlas.requirements import Require, screen
 from graspatlas.result import Result
 from graspatlas.systems import AnySystem
@@ -120,8 +122,9 @@ def optimize(
     dimension: int | None = None,
     radius: float | None = None,
     epsilon: float | None = None,
-    quality: Quality | None = None,
+    quality: Quality | Sequence[Quality] | None = None,
     require: Sequence[Require] = (),
+    refine: bool | str = False,
     max_charts: int | None = None,
     max_seconds: float | None = None,
     progress: bool | None = None,
@@ -135,8 +138,11 @@ def optimize(
         dimension: k, of the set of relevant grasps: 1 to t.
         radius: r, of a chart [rad, and lengths in units of ``problem.length_scale``].
         epsilon: See :func:`build_atlas`.
-        quality: Name of an index, or a callable: see :mod:`graspatlas.quality`.
+        quality: Name of an index, or a callable: see :mod:`graspatlas.quality`. Of several, the first chooses the best,
+            and the others are kept in ``result.others``.
         require: What a grasp must meet to be the best or the worst: see :mod:`graspatlas.requirements`.
+        refine: Climb from the best charts to the maximum between the charts' centres, ``result.refined_best``: in R
+            with True or ``"relevant"``, then on in all dimensions of F with ``"feasible"``; see :func:`refine`.
         max_charts: See :func:`build_atlas`.
         max_seconds: See :func:`build_atlas`.
         progress: See :func:`build_atlas`.
@@ -154,7 +160,9 @@ def optimize(
         raise GraspAtlasError(f"problem must be a graspatlas.Problem, got {type(problem).__name__}; see load_problem")
     chosen = {"dimension": dimension, "radius": radius, "epsilon": epsilon, "quality": quality}
     options = _with_defaults(problem, chosen)
-    find_index(options["quality"])
+    first, *others = _indices(options["quality"])
+    if refine not in (False, True, "relevant", "feasible"):
+        raise GraspAtlasError(f"refine must be True, False, 'relevant' or 'feasible', got {refine!r}")
     system = problem.system(options["dimension"])
     atlas = build_atlas(
         system,
@@ -168,17 +176,34 @@ def optimize(
     start = time.perf_counter()
     grasps = Grasps(problem, atlas.centers, system)
     feasible, refused = screen(require, grasps)
-    qualities = evaluate(options["quality"], grasps)
-    return Result(
+    qualities = evaluate(first, grasps)
+    values = {quality_name(other): evaluate(other, grasps) for other in others}
+    result = Result(
         problem=problem,
         atlas=atlas,
-        quality=options["quality"],
+        quality=first,
         qualities=qualities,
         quality_seconds=time.perf_counter() - start,
         requirements=tuple(require),
         feasible=feasible,
         refused=refused,
+        others=values,
     )
+    if refine and feasible.any():
+        found = climb_peaks(result, all_motions=refine == "feasible", progress=progress)
+        result = replace(result, refinement=found)
+    return result
+
+
+def _indices(quality: Quality | Sequence[Quality]) -> list[Quality]:
+    """The indices asked for, each once."""
+    several = list(quality) if isinstance(quality, list | tuple) else [quality]  # type: ignore[list-item]
+    for one in several:
+        find_index(one)
+    names = [quality_name(one) for one in several]
+    if not names or len(set(names)) < len(names):
+        raise GraspAtlasError(f"quality must name one index or several different ones, got {names}")
+    return several
 
 
 def _with_defaults(problem: Problem, chosen: dict[str, Any]) -> dict[str, Any]:

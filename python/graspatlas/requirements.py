@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, fields
-from typing import Any, ClassVar
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ from graspatlas import _core
 from graspatlas.collision import CollisionChecker
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.grasps import Grasps
+
+if TYPE_CHECKING:
+    from graspatlas.problem import Problem
 
 __all__ = [
     "REQUIREMENTS",
@@ -29,7 +33,14 @@ __all__ = [
     "screen",
 ]
 
+Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Slacks = Callable[[Grasps], Array]
+
+#: How many pairs of shapes an optimiser watches; all are checked before it takes a step.
+NEAREST_PAIRS = 12
+#: What optimisers keep beyond the clearance: distances of touching shapes have no slope [m].
+CLOSEST = 1e-5
 
 
 @dataclass(frozen=True)
@@ -46,6 +57,18 @@ class Requirement:
     def met(self, grasps: Grasps) -> Flags:
         """Whether each grasp meets the requirement [n]."""
         raise NotImplementedError
+
+    def slacks_near(self, grasp: Grasps) -> Slacks | None:
+        """By how much the requirement is met round one grasp, for optimisers; None where that has no sense.
+
+        Args:
+            grasp: A batch of one grasp.
+
+        Returns:
+            A function of a batch [n] that returns [n, c] numbers of about the size of a tangent coordinate, none
+            negative where the requirement is met, as smooth as there are. What cannot matter nearby may be left out.
+        """
+        return None
 
     def __str__(self) -> str:
         return ":".join([self.name, *(f"{value:g}" for value in astuple(self))])
@@ -79,6 +102,17 @@ class JointMargin(Requirement):
         lower, upper = grasps.problem.hand.joint_limits
         return np.asarray(((grasps.q - lower >= self.distance) & (upper - grasps.q >= self.distance)).all(axis=1))
 
+    def slacks_near(self, grasp: Grasps) -> Slacks:
+        """Distance of each limited joint from its limits, less the distance asked for [rad or m]."""
+        lower, upper = grasp.problem.hand.joint_limits
+        low, high = np.isfinite(lower), np.isfinite(upper)
+
+        def slacks(grasps: Grasps) -> Array:
+            q = grasps.q
+            return np.hstack([q[:, low] - lower[low], upper[high] - q[:, high]]) - self.distance
+
+        return slacks
+
 
 @dataclass(frozen=True)
 class ForceClosure(Requirement):
@@ -103,6 +137,15 @@ class ForceClosure(Requirement):
         margins = np.asarray(_core.force_closure_margins(grasps.system, grasps.x, self.friction))
         return np.asarray((margins > 0.0) & (margins >= self.margin))
 
+    def slacks_near(self, grasp: Grasps) -> Slacks:
+        """The force-closure margin, less the margin asked for."""
+
+        def slacks(grasps: Grasps) -> Array:
+            margins = np.asarray(_core.force_closure_margins(grasps.system, grasps.x, self.friction))
+            return margins[:, None] - self.margin
+
+        return slacks
+
 
 @dataclass(frozen=True)
 class CollisionFree(Requirement):
@@ -123,7 +166,22 @@ class CollisionFree(Requirement):
 
     def met(self, grasps: Grasps) -> Flags:
         """Whether each grasp meets the requirement [n]."""
-        return CollisionChecker(grasps.problem, self.touch_depth, self.clearance).free(grasps.x)
+        return self._checker(grasps.problem).free(grasps.x)
+
+    def slacks_near(self, grasp: Grasps) -> Slacks:
+        """Distances of the nearest pairs of shapes, less those asked for, in units of the problem's length scale."""
+        checker = self._checker(grasp.problem)
+        pairs = np.argsort(checker.clearances(grasp.x)[0])[:NEAREST_PAIRS]
+        return lambda grasps: (checker.clearances(grasps.x, pairs) - CLOSEST) / grasps.problem.length_scale
+
+    def _checker(self, problem: Problem) -> CollisionChecker:
+        return _checker(problem, self.touch_depth, self.clearance)
+
+
+@lru_cache(maxsize=4)
+def _checker(problem: Problem, touch_depth: float, clearance: float) -> CollisionChecker:
+    """Checkers of the last problems: reading the shapes takes longer than to check a thousand grasps."""
+    return CollisionChecker(problem, touch_depth, clearance)
 
 
 Require = Requirement | Callable[[Any], Any]

@@ -6,7 +6,7 @@ import json
 import os
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -19,7 +19,8 @@ from graspatlas.checks import CheckReport, check_result
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasp, Grasps
 from graspatlas.problem import Problem
-from graspatlas.quality import Quality, quality_name
+from graspatlas.quality import Quality, evaluate, quality_name
+from graspatlas.refinement import Refinement
 from graspatlas.requirements import Require, parse_requirement, requirement_name
 from graspatlas.tables import number
 
@@ -29,6 +30,9 @@ Array = NDArray[np.float64]
 
 FORMAT = "graspatlas result"
 FORMAT_VERSION = 1
+
+_REFINEMENT_FLAGS = ("all_motions", "complete")
+_REFINEMENT_ARRAYS = tuple(f.name for f in fields(Refinement) if f.name not in _REFINEMENT_FLAGS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +48,8 @@ class Result:
         requirements: What a grasp must meet to be the best or the worst; names where a callable was not stored.
         feasible: Which charts meet the requirements [n].
         refused: How many charts each requirement refused, of those that the ones before it had left.
+        others: Values of the other indices that were asked for, by name, [n] each.
+        refinement: Local maxima between the charts' centres, when they were asked for.
     """
 
     problem: Problem
@@ -54,6 +60,8 @@ class Result:
     requirements: tuple[Require | str, ...]
     feasible: NDArray[np.bool_]
     refused: Mapping[str, int]
+    others: Mapping[str, Array] = field(default_factory=dict)
+    refinement: Refinement | None = None
 
     @property
     def status(self) -> Status:
@@ -100,6 +108,55 @@ class Result:
             counts = ", ".join(f"{name} refused {count}" for name, count in self.refused.items())
             raise GraspAtlasError(f"none of {self.atlas.n_charts} grasps meets the requirements ({counts}): relax one")
         return np.flatnonzero(self.feasible)
+
+    @cached_property
+    def refined_best(self) -> Grasp:
+        """The best grasp, no longer bound to the centre of a chart; its chart is the one the climb to it began from.
+
+        Raises:
+            GraspAtlasError: If no refinement was asked for.
+        """
+        if self.refinement is None:
+            raise GraspAtlasError("this result was not refined: give optimize refine=True")
+        system = self.problem.full_system if self.refinement.all_motions else self.atlas.system
+        one = Grasps(self.problem, self.refinement.x[0], system)[0]  # type: ignore[arg-type]
+        quality, chart = float(self.refinement.qualities[0]), int(self.refinement.starts[0])
+        return replace(one, quality=quality, chart=chart)
+
+    @property
+    def gain(self) -> float:
+        """By how much the refined best is better than the best chart, as a share of the latter's quality."""
+        return (self.refined_best.quality - self.best.quality) / max(abs(self.best.quality), 1e-300)
+
+    def values(self, quality: Quality) -> Array:
+        """Value of any index at each chart centre [n].
+
+        Args:
+            quality: Name of an index, or a callable: see :mod:`graspatlas.quality`.
+
+        Raises:
+            GraspAtlasError: If there is no such index, or it fails.
+        """
+        name = quality_name(quality)
+        if quality == self.quality:
+            return self.qualities
+        if isinstance(quality, str) and name in self.others:
+            return self.others[name]
+        return evaluate(quality, Grasps(self.problem, self.atlas.centers, self.atlas.system))  # type: ignore[arg-type]
+
+    def by(self, quality: Quality) -> Result:
+        """The same grasps with another index to choose the best by; not refined.
+
+        Args:
+            quality: Name of an index, or a callable.
+
+        Raises:
+            GraspAtlasError: If there is no such index, or it fails.
+        """
+        values = self.values(quality)
+        kept = {**self.others, quality_name(self.quality): self.qualities}
+        kept.pop(quality_name(quality), None)
+        return replace(self, quality=quality, qualities=values, others=kept, refinement=None)
 
     @property
     def at_x1(self) -> Grasp:
@@ -148,6 +205,32 @@ class Result:
                 "object_quat_xyzw": best.object_quat_xyzw.tolist(),
                 "chart": best.chart,
             },
+            **({"others": self._summary_of_others(best)} if self.others else {}),
+            **({"refined": self._summary_of_refinement()} if self.refinement else {}),
+        }
+
+    def _summary_of_others(self, best: Grasp | None) -> dict[str, Any]:
+        """The other indices: at the best grasp, and over all grasps that meet the requirements."""
+        out = {}
+        for name, values in self.others.items():
+            left = values[self.feasible]
+            at_best = float(values[best.chart]) if best else None
+            out[name] = {"at_best": at_best, **({"largest": float(left.max())} if len(left) else {})}
+        return out
+
+    def _summary_of_refinement(self) -> dict[str, Any]:
+        best, refinement = self.refined_best, self.refinement
+        assert refinement is not None
+        return {
+            "quality": best.quality,
+            "gain": self.gain,
+            "converged": bool(refinement.converged[0]),
+            "n_peaks": refinement.n_peaks,
+            "all_motions": refinement.all_motions,
+            "complete": refinement.complete,
+            "q": best.q.tolist(),
+            "object_xyz": best.object_xyz.tolist(),
+            "object_quat_xyzw": best.object_quat_xyzw.tolist(),
         }
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -173,7 +256,12 @@ class Result:
             "quality_seconds": self.quality_seconds,
             "requirements": [requirement_name(r) for r in self.requirements],
             "refused": dict(self.refused),
+            "others": list(self.others),
         }
+        extra: dict[str, Any] = {f"other_{i}": values for i, values in enumerate(self.others.values())}
+        if self.refinement is not None:
+            header["refinement"] = {name: getattr(self.refinement, name) for name in _REFINEMENT_FLAGS}
+            extra |= {f"refined_{name}": getattr(self.refinement, name) for name in _REFINEMENT_ARRAYS}
         temporary = None
         try:
             descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
@@ -183,6 +271,7 @@ class Result:
                     header=json.dumps(header),
                     qualities=self.qualities,
                     feasible=self.feasible,
+                    **extra,
                     **self.atlas.to_arrays(),
                 )
             os.chmod(temporary, 0o644)
@@ -237,6 +326,8 @@ def _from_parts(header: Mapping[str, Any], arrays: dict[str, Any], source: Path)
     try:
         problem = Problem.from_dict(header["problem"])
         qualities, feasible = arrays.pop("qualities"), arrays.pop("feasible")
+        others = {str(name): arrays.pop(f"other_{i}") for i, name in enumerate(header.get("others", []))}
+        refinement = _refinement(header.get("refinement"), arrays, problem)
         atlas = Atlas(
             system=problem.system(header["dimension"]),
             radius=number(header["radius"], "radius"),
@@ -248,8 +339,9 @@ def _from_parts(header: Mapping[str, Any], arrays: dict[str, Any], source: Path)
         atlas.check_arrays()
         if qualities.shape != (atlas.n_charts,) or feasible.shape != qualities.shape or feasible.dtype != bool:
             raise GraspAtlasError("qualities and feasible need one entry a chart")
-        if qualities.dtype.kind != "f" or np.isnan(qualities).any():
-            raise GraspAtlasError("qualities must be numbers")
+        for values in (qualities, *others.values()):
+            if values.shape != qualities.shape or values.dtype.kind != "f" or np.isnan(values).any():
+                raise GraspAtlasError("qualities must be numbers, one a chart")
         if not atlas.radius > 0.0 or not 0.0 < atlas.epsilon < 1.0 or not isinstance(header["quality"], str):
             raise GraspAtlasError("its header holds a value that cannot be")
         return Result(
@@ -261,9 +353,25 @@ def _from_parts(header: Mapping[str, Any], arrays: dict[str, Any], source: Path)
             requirements=tuple(_stored_requirement(str(text)) for text in header["requirements"]),
             feasible=feasible,
             refused={str(name): int(count) for name, count in header["refused"].items()},
+            others=others,
+            refinement=refinement,
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise GraspAtlasError(f"result '{source}' is damaged ({error}); compute it again") from None
+
+
+def _refinement(flags: Mapping[str, Any] | None, arrays: dict[str, Any], problem: Problem) -> Refinement | None:
+    """The refinement of a result file, taken out of its arrays."""
+    if flags is None:
+        return None
+    parts = {name: arrays.pop(f"refined_{name}") for name in _REFINEMENT_ARRAYS}
+    p = len(parts["x"])
+    shapes = {"x": (p, problem.full_system.configuration_size), "qualities": (p,), "starts": (p,), "converged": (p,)}
+    kinds = {"x": "f", "qualities": "f", "starts": "i", "converged": "b"}
+    for name, array in parts.items():
+        if p == 0 or array.shape != shapes[name] or array.dtype.kind != kinds[name] or not np.isfinite(array).all():
+            raise GraspAtlasError(f"the refined {name} have shape {array.shape} and type {array.dtype}")
+    return Refinement(**parts, all_motions=bool(flags["all_motions"]), complete=bool(flags["complete"]))
 
 
 def _stored_requirement(text: str) -> Require | str:

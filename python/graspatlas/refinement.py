@@ -1,0 +1,123 @@
+"""The best grasp beyond the charts' centres: climbs from the best chart of each basin, so that r no longer matters."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from graspatlas.errors import GraspAtlasError
+from graspatlas.local_search import Climb, Peak, climb, local_maxima, peaks_of
+
+if TYPE_CHECKING:
+    from graspatlas.result import Result
+
+__all__ = ["Refinement", "refine"]
+
+Array = NDArray[np.float64]
+
+#: Local maxima of the atlas from which to climb, the best first.
+MOST_STARTS = 40
+#: Climbing that ends within this shows no progress bar [s].
+QUIET_SECONDS = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """Local maxima of the index on the manifold, the best first.
+
+    Attributes:
+        x: The grasps [p, configuration_size].
+        qualities: The index there [p].
+        starts: Chart from which the climb to each began [p].
+        converged: False for those that were still climbing when given up: the index may have no maximum there [p].
+        all_motions: True when no hand motion was frozen: the grasps lie in F, not only in R.
+        complete: False when interrupted, so that basins may be missing.
+    """
+
+    x: Array
+    qualities: Array
+    starts: NDArray[np.int64]
+    converged: NDArray[np.bool_]
+    all_motions: bool
+    complete: bool
+
+    @property
+    def n_peaks(self) -> int:
+        """Number of local maxima."""
+        return len(self.x)
+
+
+def refine(result: Result, *, all_motions: bool = False, progress: bool | None = None) -> Refinement:
+    """Climb from the best chart of each basin, on the manifold and within bounds and requirements.
+
+    A basin is what one local maximum of the index over the charts stands for. Its climb is that of
+    :func:`graspatlas.climb`; climbs that end in one place count once. Ctrl-C keeps the climbs that have ended.
+
+    Args:
+        result: The result.
+        all_motions: Go on from there in all t dimensions of F, no hand motion frozen.
+        progress: Show a progress bar on standard error; by default when it is a terminal.
+
+    Returns:
+        The local maxima that were found.
+
+    Raises:
+        GraspAtlasError: If no grasp meets the requirements, or a requirement is a function that a file did not keep.
+
+    Source: refines the grid search of "Global Optimization of Robotic Grasps", Section IV.
+    """
+    charts = local_maxima(result)[:MOST_STARTS]
+    if len(charts) == 0:
+        raise GraspAtlasError("no grasp meets the requirements, so there is none to refine: relax one")
+    shown = sys.stderr.isatty() if progress is None else progress
+    bar = tqdm(
+        total=len(charts),
+        desc="refine",
+        unit=" climbs",
+        disable=not shown,
+        delay=QUIET_SECONDS,
+        file=sys.stderr,
+    )
+    ends: list[Climb] = []
+    starts = np.asarray(charts)
+    complete = True
+    try:
+        for chart in charts:
+            ends.append(climb(result, int(chart)))
+            bar.update()
+        if all_motions:
+            # Climbs in R that met go on as one.
+            tops = [_top(peak, ends) for peak in peaks_of(result, ends)]
+            bar.total = len(charts) + len(tops)
+            starts = starts[tops]
+            reached, ends = [ends[top] for top in tops], []
+            for end in reached:
+                ends.append(climb(result, end.x, all_motions=True))
+                bar.update()
+    except KeyboardInterrupt:
+        complete = False
+        if not ends:
+            best = result.best
+            ends, starts = [Climb(best.chart, best.x, np.array([best.quality]), False)], np.array([best.chart])
+    finally:
+        bar.close()
+    peaks = peaks_of(result, ends)
+    return Refinement(
+        x=np.array([peak.x for peak in peaks]),
+        qualities=np.array([peak.quality for peak in peaks]),
+        starts=np.array([starts[_top(peak, ends)] for peak in peaks], np.int64),
+        converged=np.array([ends[_top(peak, ends)].converged for peak in peaks], bool),
+        all_motions=all_motions,
+        complete=complete,
+    )
+
+
+def _top(peak: Peak, ends: Sequence[Climb]) -> int:
+    """Number of the climb that ended highest on a peak."""
+    return int(max(peak.climbs, key=lambda c: ends[int(c)].quality))
