@@ -197,7 +197,7 @@ def optimize(
 
 def _indices(quality: Quality | Sequence[Quality]) -> list[Quality]:
     """The indices asked for, each once."""
-    several = list(quality) if isinstance(quality, list | tuple) else [quality]  # type: ignore[list-item]
+    several: list[Any] = list(quality) if isinstance(quality, list | tuple) else [quality]
     for one in several:
         find_index(one)
     names = [quality_name(one) for one in several]
