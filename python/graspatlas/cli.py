@@ -1,4 +1,4 @@
-"""Command line: graspatlas list, optimize, view, check-result, reproduce."""
+"""Command line: graspatlas list, optimize, view, check-result, sweep, reproduce."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,6 +128,8 @@ def _parser() -> argparse.ArgumentParser:
     verify.add_argument("result", type=Path, help="folder or file that optimize wrote")
     verify.set_defaults(run=_check_result)
 
+    _add_sweep(commands)
+
     again = commands.add_parser(
         "reproduce", help="run the paper's experiments and write a page to lay beside the paper"
     )
@@ -137,6 +139,26 @@ def _parser() -> argparse.ArgumentParser:
     again.add_argument("--experiment", metavar="NAME", help="only this experiment")
     again.set_defaults(run=_reproduce)
     return parser
+
+
+def _add_sweep(commands: Any) -> None:
+    many = commands.add_parser("sweep", help="run many problems with many options, on all cores or a cluster")
+    many.add_argument("problems", nargs="+", metavar="PROBLEM", help="names of bundled problems, or problem files")
+    many.add_argument(
+        "--output", type=Path, required=True, metavar="FOLDER", help="keep the rows in runs.parquet there"
+    )
+    many.add_argument("--dimension", type=int, nargs="+", default=[], metavar="K", help="dimensions k to try")
+    many.add_argument("--radius", type=float, nargs="+", default=[], metavar="R", help="radii of a chart to try")
+    many.add_argument("--epsilon", type=float, nargs="+", default=[], metavar="E", help="values of epsilon to try")
+    many.add_argument("--quality", nargs="+", default=[], metavar="NAME", help="quality indices to try")
+    many.add_argument("--require", action="append", default=[], metavar="NAME[:VALUE...]", help="as for optimize")
+    many.add_argument("--refine", action="store_true", help="climb to the maximum between the charts' centres")
+    many.add_argument("--max-charts", type=int, metavar="N", help="cut every atlas short after N charts")
+    many.add_argument("--max-seconds", type=float, metavar="S", help="cut every atlas short after S seconds")
+    many.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler; the cores of this machine else")
+    many.add_argument("--workers", type=int, metavar="N", help="processes on this machine; one a core else")
+    many.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    many.set_defaults(run=_sweep)
 
 
 def _list(_: argparse.Namespace) -> int:
@@ -261,6 +283,40 @@ def _check_result(options: argparse.Namespace) -> int:
     print(f"{result.problem.name}: {result.atlas.n_charts} charts, {result.status}")
     print(report)
     return 0 if report else FAILED
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    from graspatlas.sweep import run_sweep  # slow to import
+
+    sweep = run_sweep(
+        options.problems,
+        options.output,
+        dimensions=options.dimension,
+        radii=options.radius,
+        epsilons=options.epsilon,
+        qualities=options.quality,
+        require=options.require,
+        refine=options.refine,
+        max_charts=options.max_charts,
+        max_seconds=options.max_seconds,
+        scheduler=options.scheduler,
+        workers=options.workers,
+        progress=True,
+    )
+    if options.json:
+        counts = {"runs": len(sweep.rows), "skipped": sweep.skipped, "failed": len(sweep.failed)}
+        print(json.dumps({**counts, "missing": sweep.missing, "rows": str(sweep.path), "best": sweep.best()}))
+    else:
+        print(f"{len(sweep.rows)} runs in {sweep.path}: {sweep.skipped} from before, {len(sweep.failed)} failed")
+        for row in sweep.failed:
+            print(f"  {row['file']}: {row['error']}")
+        for name, row in sweep.best().items():
+            options_of = ", ".join(f"{key} {row[key]:g}" for key in ("dimension", "radius", "epsilon"))
+            print(f"  best {name}: {row['quality_best']:.9g}, {row['problem']} with {options_of}; {row['status']}")
+    if sweep.missing:
+        print(f"interrupted: {sweep.missing} runs are left; start the sweep again to go on", file=sys.stderr)
+        return INTERRUPTED
+    return FAILED if sweep.failed else 0
 
 
 def _reproduce(options: argparse.Namespace) -> int:
