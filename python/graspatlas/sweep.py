@@ -2,7 +2,8 @@
 
 A run is one problem with one choice of options. Dask distributes the runs: on this machine's cores, or on any
 scheduler whose address is given (docs/sweeps.md shows a Slurm cluster). Finished runs are written as they come and
-skipped when the sweep is started again; a run that fails becomes a row with its error, which the next start tries again.
+skipped when the sweep is started again; a run that fails becomes a row with its error, which the next start tries
+again.
 """
 
 from __future__ import annotations
@@ -236,7 +237,7 @@ def _runs_of(file: str, fixed: Run, choices: Sequence[Sequence[Any]]) -> Iterato
     data = problem.to_dict()
     for choice in choices:
         names = ("dimension", "radius", "epsilon", "quality")
-        options = {
+        options: dict[str, Any] = {
             name: problem.defaults.get(name) if value is None else value
             for name, value in zip(names, choice, strict=True)
         }
