@@ -190,7 +190,8 @@ def run_sweep(
     for text in require:
         parse_requirement(text)
     fixed = Run("", None, require=tuple(require), refine=refine, max_charts=max_charts, max_seconds=max_seconds)
-    choices = list(itertools.product(dimensions or [None], radii or [None], epsilons or [None], qualities or [None]))
+    values: list[Sequence[Any]] = [dimensions, radii, epsilons, qualities]
+    choices = list(itertools.product(*(value or [None] for value in values)))
     runs = {run.key: run for file in problems for run in _runs_of(str(file), fixed, choices)}
     if not runs:
         raise GraspAtlasError("a sweep needs at least one problem; 'graspatlas list' names those that are bundled")
