@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import sys
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from tqdm import tqdm
 
 from graspatlas.errors import GraspAtlasError
 
@@ -19,6 +23,9 @@ __all__ = ["CollisionChecker"]
 OBJECT = "object/"
 #: Distances are as exact as this, so that optimisers can differentiate them; depths are not [m].
 DISTANCE_TOLERANCE = 1e-10
+#: Grasps are checked in batches of this size, on all cores, unless there are very few.
+BATCH = 2048
+SMALLEST_BATCH = 64
 
 
 class CollisionChecker:
@@ -78,10 +85,30 @@ class CollisionChecker:
         Args:
             X: One grasp a row [n, configuration_size].
         """
-        compute = self._pin.computeCollisions
-        model, data, geometry, geometry_data = self._model, self._data, self._geometry, self._geometry_data
-        rows = np.ascontiguousarray(np.asarray(X, float)[:, : model.nq])
-        return np.array([not compute(model, data, geometry, geometry_data, q, True) for q in rows], bool)
+        rows = np.asarray(X, float)[:, : self._model.nq]
+        if len(rows) < SMALLEST_BATCH:
+            args = self._model, self._data, self._geometry, self._geometry_data
+            return np.array([not self._pin.computeCollisions(*args, q, True) for q in np.ascontiguousarray(rows)], bool)
+        out = np.empty(len(rows), bool)
+        bar = tqdm(total=len(rows), desc="collisions", unit=" grasps", delay=1.0, disable=not sys.stderr.isatty())
+        with bar:
+            for start in range(0, len(rows), BATCH):
+                batch = np.asfortranarray(rows[start : start + BATCH].T)
+                threads = len(os.sched_getaffinity(0))
+                hits = self._pin.computeCollisionsInParallel(threads, self._pool, batch, True, False)
+                out[start : start + BATCH] = ~np.asarray(hits, bool)
+                bar.update(batch.shape[1])
+        return out
+
+    @cached_property
+    def _pool(self) -> Any:
+        """Copies of the geometry, one for each thread."""
+        size = len(os.sched_getaffinity(0))
+        pool = self._pin.GeometryPool(self._model, self._geometry, size)
+        for i in range(size):
+            for pair, request in enumerate(self._geometry_data.collisionRequests):
+                pool.getGeometryData(i).collisionRequests[pair] = request
+        return pool
 
     def clearances(self, X: ArrayLike, pairs: ArrayLike | None = None) -> NDArray[np.float64]:
         """Distance of each pair of shapes, less the distance that it must keep; negative in collision [n, p], metres.
