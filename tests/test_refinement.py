@@ -143,6 +143,8 @@ def test_wrong_input_is_refused(can: ga.Result) -> None:
         ga.climb(can, int(np.flatnonzero(~can.feasible)[0]))
     with pytest.raises(ga.GraspAtlasError, match="a climb starts from"):
         ga.climb(can, np.zeros(3))
+    with pytest.raises(ga.GraspAtlasError, match="misses its equations"):
+        ga.climb(can, can.best.x + 1e-3)
     nothing = ga.optimize(problem, require=[lambda grasp: False], refine=True)
     assert nothing.refinement is None
     with pytest.raises(ga.GraspAtlasError, match="no grasp meets the requirements"):

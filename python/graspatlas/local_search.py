@@ -47,6 +47,8 @@ MARGIN = 1e-6
 SHARES = np.array([1.0, 0.99, 0.9, 0.6, 0.3, 0.1])
 #: How far a point may be outside its bounds [units of the tangent space].
 BOUND_TOLERANCE = 1e-9
+#: How far a start may miss its equations and be outside its bounds.
+ON_MANIFOLD = 1e-8
 #: Step of the differences, as a share of the reach.
 DIFFERENCE = 1e-3
 #: Directions that are tried when the optimiser finds nothing better.
@@ -125,12 +127,20 @@ def climb(result: Result, start: int | ArrayLike, *, all_motions: bool = False, 
         The climb.
 
     Raises:
-        GraspAtlasError: If there is no such chart, the start does not meet the requirements, or the index fails.
+        GraspAtlasError: If there is no such chart, the start is no feasible grasp or does not meet the requirements, or
+            the index fails.
     """
     if isinstance(max_steps, bool) or not isinstance(max_steps, int | np.integer) or max_steps < 1:
         raise GraspAtlasError(f"max_steps must be a whole number of at least 1, got {max_steps!r}")
     hill = _Hill.of(result, all_motions)
     chart, x = _start(result, start)
+    residual = float(np.abs(hill.system.evaluate_residual(x)).max(initial=0.0))
+    outside = float(-hill.system.slack(x).min(initial=0.0))
+    if residual > ON_MANIFOLD or outside > ON_MANIFOLD:
+        raise GraspAtlasError(
+            f"the grasp to climb from misses its equations by {residual:.3g} and its bounds by {max(outside, 0.0):.3g}; "
+            "project it first, see Atlas.point"
+        )
     if not hill.meets(x):
         name = f"chart {chart}" if chart >= 0 else "the grasp"
         raise GraspAtlasError(f"{name} does not meet the requirements; start from one that does, see result.feasible")
