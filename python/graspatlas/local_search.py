@@ -138,8 +138,8 @@ def climb(result: Result, start: int | ArrayLike, *, all_motions: bool = False, 
     outside = float(-hill.system.slack(x).min(initial=0.0))
     if residual > ON_MANIFOLD or outside > ON_MANIFOLD:
         raise GraspAtlasError(
-            f"the grasp to climb from misses its equations by {residual:.3g} and its bounds by {max(outside, 0.0):.3g}; "
-            "project it first, see Atlas.point"
+            f"the grasp misses its equations by {residual:.3g} and its bounds by {max(outside, 0.0):.3g}; "
+            "project it before you climb from it, see Atlas.point"
         )
     if not hill.meets(x):
         name = f"chart {chart}" if chart >= 0 else "the grasp"
