@@ -34,7 +34,7 @@ LINK = 0.25
 #: Elbows turn by more than half a turn from x1, and so may come back with another frozen hand motion.
 ELBOWS = (1, 3, 5)
 #: How far the other joints may turn [rad].
-BASES_REACH = 2.5
+BASES_REACH = 3.0
 
 
 def unit(angle: Array) -> Array:
@@ -95,12 +95,13 @@ def crossings(hand: PlanarHand, steps: Array, feasible: Array) -> list[Array]:
         change = wrapped(steps[second][both] - start)
         near = np.abs(change).max(axis=1) < 1.0
         start, change = start[near], change[near]
+        before, slope = start @ hand.frozen, change @ hand.frozen
         for rounds in np.ndindex(3, 3, 3):
-            z = start.copy()
-            z[:, ELBOWS] += 2.0 * np.pi * (np.array(rounds) - 1)
-            g, slope = z @ hand.frozen, change @ hand.frozen
+            turns = np.zeros(6)
+            turns[list(ELBOWS)] = 2.0 * np.pi * (np.array(rounds) - 1)
+            g = before + turns @ hand.frozen
             hit = g * (g + slope) <= 0.0
-            found.append(z[hit] - (g[hit] / slope[hit])[:, None] * change[hit])
+            found.append(start[hit] + turns - (g[hit] / slope[hit])[:, None] * change[hit])
     return found
 
 
@@ -145,6 +146,26 @@ def test_every_component_of_the_planar_hand_is_found(counted, planar):
     assert min(map(len, counted)) > 100  # no crumbs
     assert len(planar) == len(counted) == 2
     assert all(result.is_global for result in planar.results)
+
+
+@pytest.mark.parametrize(
+    ("offset", "count"),
+    [([[0.06, 0.14], [0.03, 0.26], [0.19, -0.3]], 3), ([[0.22, -0.37], [-0.73, -0.77], [0.5, 0.66]], 0)],
+    ids=["three", "none"],
+)
+def test_as_many_as_by_brute_force_where_the_hand_motions_pass_elsewhere(offset, count):
+    hand = PlanarHand.read()
+    hand = replace(hand, theta_1=hand.theta_1 + offset)
+    problem = without_x1("planar_hand")
+    assert problem.hand.joints[:2] == ("first_base", "first_elbow")
+    problem = replace(problem, reference=dict(zip(problem.hand.joints, hand.theta_1.ravel().tolist(), strict=True)))
+    if count == 0:
+        assert count_components(hand) == []
+        with pytest.raises(ga.GraspAtlasError, match="no feasible grasp"):
+            ga.find_components(problem, max_seconds=3.0)
+        return
+    assert sum(len(c) > 100 for c in count_components(hand)) == count
+    assert len(ga.find_components(problem)) == count
 
 
 def test_components_are_those_of_the_brute_force(counted, planar):
@@ -254,7 +275,8 @@ def test_limit_of_time():
 
 def test_pieces_of_a_component_that_meet_are_one():
     """Atlases cut short are pieces; one that grew over an older one takes its place."""
-    found = ga.find_components(without_x1("planar_hand"), max_charts=500, max_seconds=8.0, covered=50)
+    found = ga.find_components(without_x1("planar_hand"), max_charts=700, covered=25)
+    assert found.status is ga.SearchStatus.COVERED
     assert found.holes > 0
     assert len(found) == 2
 

@@ -197,17 +197,16 @@ def _trace_all(
     """Find grasps and trace their components until enough in a row were covered."""
     if problem.x1 is not None:
         traced.trace(problem)
-    with search_bar("grasps", progress) as bar:
+    with search_bar("tries", progress) as bar:
         while traced.covered < covered:
             if traced.interrupted:
                 return SearchStatus.INTERRUPTED
-            x = search.next_grasp(traced.deadline)
+            x = search.next_grasp(traced.deadline, bar)
             if x is None:
                 late = time.perf_counter() > traced.deadline
                 return SearchStatus.TIME_LIMIT if late else SearchStatus.NO_GRASP
             traced.take(search.problem, x)
-            bar.set_postfix(components=len(traced.results), refresh=False)
-            bar.update()
+            bar.set_postfix(grasps=search.found, components=len(traced.results), refresh=False)
     return SearchStatus.COVERED
 
 
@@ -219,11 +218,7 @@ class _Tracer:
         self.results: list[Result] = []
         self.hits: list[int] = []
         self.covered = self.holes = 0
-
-    @property
-    def interrupted(self) -> bool:
-        """True when the last atlas was."""
-        return bool(self.results) and self.results[-1].status is Status.INTERRUPTED
+        self.interrupted = False
 
     def take(self, problem: Problem, x: Array) -> None:
         """Count a grasp that was found to the component that covers it, or trace its component."""
@@ -240,6 +235,7 @@ class _Tracer:
         left = self.deadline - time.perf_counter()
         seconds = None if np.isinf(left) else max(left, 1e-3)
         new = optimize(problem, **self.options, max_seconds=seconds, progress=self.progress)
+        self.interrupted = new.status is Status.INTERRUPTED
         for i, old in enumerate(self.results):
             if _same_component(new.atlas, old.atlas):
                 self.holes += 1

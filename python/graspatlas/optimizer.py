@@ -154,7 +154,7 @@ def optimize(
     """
     chosen = {"dimension": dimension, "radius": radius, "epsilon": epsilon, "quality": quality}
     options = options_of(problem, chosen)
-    problem = with_first_grasp(problem, options["dimension"], max_seconds)
+    problem = with_first_grasp(problem, options["dimension"], max_seconds, progress)
     system = problem.system(options["dimension"])
     atlas = build_atlas(
         system,

@@ -65,32 +65,35 @@ def find_grasps(
     deadline = deadline_after(max_seconds)
     found: list[Array] = []
     places: list[Array] = []
-    with search_bar("grasps", progress, total=int(count)) as bar:
+    with search_bar("tries", progress) as bar:
         try:
             while len(found) < count:
-                x = search.next_grasp(deadline)
+                x = search.next_grasp(deadline, bar)
                 if x is None:
                     break
                 place = search.system.embed(x)
                 if not places or np.linalg.norm(np.array(places) - place, axis=1).min() > SAME:
                     found.append(x)
                     places.append(place)
-                    bar.update()
+                    bar.set_postfix(grasps=len(found), refresh=False)
         except KeyboardInterrupt:
             bar.write(f"interrupted: keeping {len(found)} grasps", file=sys.stderr)
     return np.array(found).reshape(len(found), search.system.configuration_size)
 
 
-def with_first_grasp(problem: Problem, dimension: int, max_seconds: float | None = None, seed: int = 0) -> Problem:
-    """The problem itself when it has an x1, or else with one that is found.
+def with_first_grasp(
+    problem: Problem, dimension: int, max_seconds: float | None = None, progress: bool | None = None
+) -> Problem:
+    """The problem itself when it has an x1, or else with one that is found, the same at every call.
 
     Raises:
         GraspAtlasError: If none is found.
     """
     if problem.x1 is not None:
         return problem
-    search = GraspSearch(problem, dimension, seed)
-    x = search.next_grasp(deadline_after(max_seconds))
+    search = GraspSearch(problem, dimension, seed=0)
+    with search_bar("tries at a first grasp", progress) as bar:
+        x = search.next_grasp(deadline_after(max_seconds), bar)
     if x is None:
         raise search.failure()
     return search.problem.at(x)
@@ -109,11 +112,11 @@ def deadline_after(max_seconds: float | None) -> float:
     return time.perf_counter() + float(max_seconds)
 
 
-def search_bar(what: str, progress: bool | None, total: int | None = None) -> tqdm[None]:
+def search_bar(what: str, progress: bool | None) -> tqdm[None]:
     """A progress bar on standard error that shows itself after a second."""
     shown = sys.stderr.isatty() if progress is None else progress
     interval = 0.1 if sys.stderr.isatty() else 10.0
-    return tqdm(desc=what, total=total, disable=not shown, delay=1.0, file=sys.stderr, mininterval=interval)
+    return tqdm(desc=what, disable=not shown, delay=1.0, file=sys.stderr, mininterval=interval)
 
 
 class GraspSearch:
@@ -143,16 +146,18 @@ class GraspSearch:
         self._rng = np.random.default_rng(seed)
         self._starts = Starts(self.problem, self.system)
 
-    def next_grasp(self, deadline: float = np.inf) -> Array | None:
+    def next_grasp(self, deadline: float, bar: tqdm[None]) -> Array | None:
         """The next grasp [size of x]; None after ``MAX_TRIES`` tries without one, or when the clock passes `deadline`.
 
         Args:
             deadline: Reading of ``time.perf_counter`` [s].
+            bar: Progress bar that counts the tries.
         """
         for _ in range(MAX_TRIES):
             if time.perf_counter() > deadline:
                 return None
             x = self.attempt()
+            bar.update()
             if x is not None:
                 return x
         return None
