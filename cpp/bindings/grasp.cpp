@@ -181,6 +181,9 @@ void bind_grasp(py::module_& module) {
            py::arg("upper"))
       .def_property_readonly("n_contacts", &GraspSystem::contact_count, "Number of contacts.")
       .def_property_readonly("n_parameters", &GraspSystem::parameter_count, "Free patch parameters.")
+      .def_property_readonly(
+          "hand_q_size", [](const GraspSystem& system) { return system.model().hand_q_size(); },
+          "Numbers of a point that are the hand's; they come first.")
       .def_property_readonly("object_dof", &GraspSystem::object_dof, "Degrees of freedom of the object.")
       .def_property_readonly("bound_names", &GraspSystem::bound_names, "Name of each bound, in the order of slack.")
       .def("grasp_arrays", &grasp_arrays, py::arg("X"),

@@ -5,8 +5,10 @@ import typing
 
 from graspatlas import motions, patches, quality, systems
 from graspatlas.atlas import Atlas, Closed, Status
-from graspatlas.contacts import Contact, FirstGrasp
+from graspatlas.components import Components, SearchStatus, find_components
+from graspatlas.contacts import Contact
 from graspatlas.errors import GraspAtlasError
+from graspatlas.first_grasp import FirstGrasp
 from graspatlas.grasps import Grasp, Grasps
 from graspatlas.hand import Body, Hand
 from graspatlas.local_search import Climb, Peak, climb, local_maxima, peaks_of
@@ -14,10 +16,12 @@ from graspatlas.motions import HandMotions
 from graspatlas.optimizer import build_atlas, optimize
 from graspatlas.problem import Problem
 from graspatlas.problems import bundled_problems, load_problem
+from graspatlas.projection import project
 from graspatlas.quality import batched
 from graspatlas.refinement import Refinement, refine
 from graspatlas.requirements import CollisionFree, ForceClosure, JointMargin
 from graspatlas.result import Result, load_result
+from graspatlas.search import find_grasps
 from graspatlas.systems import System
 from graspatlas.viewer import export_html, save_picture, view
 
@@ -41,6 +45,7 @@ __all__ = [
     "Climb",
     "Closed",
     "CollisionFree",
+    "Components",
     "Contact",
     "FirstGrasp",
     "ForceClosure",
@@ -54,6 +59,7 @@ __all__ = [
     "Problem",
     "Refinement",
     "Result",
+    "SearchStatus",
     "Status",
     "System",
     "batched",
@@ -61,6 +67,8 @@ __all__ = [
     "bundled_problems",
     "climb",
     "export_html",
+    "find_components",
+    "find_grasps",
     "load_problem",
     "load_result",
     "local_maxima",
@@ -76,6 +84,7 @@ __all__ = [
     "plot_local_maxima",
     "plot_planar_grasp",
     "plot_planar_indices",
+    "project",
     "quality",
     "refine",
     "save_picture",

@@ -398,6 +398,11 @@ class GraspSystem(AnySystem):
         Name of each bound, in the order of slack.
         """
     @property
+    def hand_q_size(self) -> int:
+        """
+        Numbers of a point that are the hand's; they come first.
+        """
+    @property
     def n_contacts(self) -> int:
         """
         Number of contacts.

@@ -15,6 +15,7 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
+from graspatlas.projection import checked_point
 from graspatlas.systems import AnySystem
 
 __all__ = ["BOX_TAG", "Atlas", "Closed", "Status"]
@@ -24,6 +25,10 @@ IntArray = NDArray[np.int64]
 
 #: Facet tag of the initial box; a tag t >= 0 is the neighbour's index, t <= -2 is bound -2 - t.
 BOX_TAG = -1
+#: Largest entry of |R(x)| of a point that is looked up.
+ON_MANIFOLD = 1e-6
+#: How far Newton's method may come down from a point that it should lead to, as a share of the radius.
+SAME_SHEET = 0.01
 #: Facets of a polygon shorter than this share of the radius are left out of the surface's triangulation.
 SHORT_FACET = 0.05
 
@@ -195,16 +200,25 @@ class Atlas:
     def locate(self, x: ArrayLike) -> tuple[int, float]:
         """Chart whose polytope a point of the manifold lies in, or the nearest one.
 
+        Charts of another sheet do not count, however near: from the point's image, eq (15) must lead back to the point.
+
         Args:
             x: A point of the manifold [configuration_size].
 
         Returns:
             The chart's index and the distance from the point's image to the polytope, 0 inside; (-1, inf) when no chart
             within reach has the point near its tangent space.
+
+        Raises:
+            GraspAtlasError: If x has another shape, is not finite, or is off the manifold by more than ``ON_MANIFOLD``.
         """
-        point = np.asarray(x, float)
-        if not np.isfinite(point).all():
-            raise GraspAtlasError("x holds a number that is not finite")
+        point = checked_point(self.system, x, "x")
+        residual = float(np.abs(self.system.evaluate_residual(point)).max(initial=0.0))
+        if not residual <= ON_MANIFOLD:
+            raise GraspAtlasError(
+                f"x is off the manifold: R(x) has an entry of {residual:.3g}, and at most {ON_MANIFOLD:g} is allowed; "
+                "project it first: graspatlas.project(atlas.system, x)"
+            )
         best, best_distance = -1, np.inf
         for chart in sorted(self._index.query_ball_point(self.system.embed(point), 2.0 * self.radius)):
             displacement = self.system.difference(self.centers[chart], point)
@@ -216,11 +230,23 @@ class Atlas:
             if excess >= best_distance:
                 continue
             distance = 0.0 if excess <= 0.0 else _distance_to_polytope(u, normals, offsets)
-            if distance < best_distance:
+            if distance < best_distance and self._leads_to(chart, u, point):
                 best, best_distance = chart, distance
-            if distance == 0.0:
+            if best_distance == 0.0:
                 break
         return best, best_distance
+
+    def _leads_to(self, chart: int, u: Array, point: Array) -> bool:
+        """False when u of a chart lies below another point of the manifold than this one."""
+        above = self.point(chart, u)
+        if above is None:
+            return True
+        apart = float(np.linalg.norm(self.system.difference(above, point)))
+        if isinstance(self.system, _core.GraspSystem):
+            # Its differences leave out the hand motions that are frozen.
+            hand = slice(self.system.hand_q_size)
+            apart = max(apart, float(np.abs(above[hand] - point[hand]).max()))
+        return apart <= SAME_SHEET * self.radius
 
     def euler_characteristic(self) -> int:
         """Euler characteristic V - E + F of the surface that the charts triangulate; for closed manifolds with k = 2.

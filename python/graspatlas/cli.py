@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from graspatlas import __version__
 from graspatlas.atlas import Status
+from graspatlas.components import Components, SearchStatus, find_components
 from graspatlas.errors import GraspAtlasError
 from graspatlas.optimizer import optimize
 from graspatlas.problems import bundled_problems, load_problem
@@ -113,6 +114,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     best.add_argument("--max-charts", type=int, metavar="N", help="cut the atlas short after N charts")
     best.add_argument("--max-seconds", type=float, metavar="S", help="cut the atlas short after S seconds")
+    best.add_argument(
+        "--components",
+        action="store_true",
+        help="search for other connected components too, and take the best grasp over all of them; --max-seconds then "
+        "limits the whole search",
+    )
     best.add_argument("--output", type=Path, metavar="FOLDER", help="write result.npz and summary.json there")
     best.add_argument("--json", action="store_true", help="print one JSON object on standard output")
     best.set_defaults(run=_optimize)
@@ -180,30 +187,59 @@ def _optimize(options: argparse.Namespace) -> int:
     problem = load_problem(options.problem)
     require = [parse_requirement(text) for text in options.require]
     folder = writable_folder(options.output) if options.output else None
-    result = optimize(
-        problem,
-        dimension=options.dimension,
-        radius=options.radius,
-        epsilon=options.epsilon,
-        quality=options.quality,
-        require=require,
-        refine=options.refine,
-        max_charts=options.max_charts,
-        max_seconds=options.max_seconds,
-        progress=True,
-    )
+    names = ("dimension", "radius", "epsilon", "quality", "refine", "max_charts", "max_seconds")
+    given = {name: getattr(options, name) for name in names}
+    if options.components:
+        return _report_components(find_components(problem, **given, require=require, progress=True), options, folder)
+    result = optimize(problem, **given, require=require, progress=True)
     if folder:
         result.save(folder / "result.npz")
-        _write_summary(result, folder / "summary.json")
+        _write_json(result.summary(), folder / "summary.json")
     print(json.dumps(result.summary()) if options.json else _report(result, folder))
     if result.status is Status.INTERRUPTED:
         return INTERRUPTED
     return 0 if result.feasible.any() else FAILED
 
 
-def _write_summary(result: Result, path: Path) -> None:
+def _report_components(found: Components, options: argparse.Namespace, folder: Path | None) -> int:
+    """Write and print the components; the exit status."""
+    best = found.best_result
+    if folder:
+        best.save(folder / "result.npz")
+        _write_json(best.summary(), folder / "summary.json")
+        _write_json(found.summary(), folder / "components.json")
+        others = writable_folder(folder / "components")
+        for number, result in enumerate(found.results[1:], start=2):
+            result.save(others / f"{number}.npz")
+    if options.json:
+        print(json.dumps(found.summary()))
+    else:
+        print("\n".join(_component_lines(found)))
+        print(_report(best, folder))
+    if found.status is SearchStatus.INTERRUPTED:
+        return INTERRUPTED
+    return 0 if best.feasible.any() else FAILED
+
+
+def _component_lines(found: Components) -> list[str]:
+    lines = [
+        f"{len(found)} components from {found.found} grasps found in {found.tries} tries, {found.seconds:.1f} s; the "
+        f"last {found.covered} lie in these: others get at most {found.share_not_found():.1%} of the finds, with 95 % "
+        "confidence"
+    ]
+    for number, (result, hits) in enumerate(zip(found.results, found.hits, strict=True), start=1):
+        quality = f"best {result.best.quality:.6g}" if result.feasible.any() else "no grasp meets the requirements"
+        lines.append(
+            f"  component {number}: {result.atlas.n_charts} charts, hit {hits} times, {quality}; {result.status}"
+        )
+    if found.status is not SearchStatus.COVERED:
+        lines.append(f"  search cut short ({found.status}): other components may exist")
+    return lines
+
+
+def _write_json(table: dict[str, Any], path: Path) -> None:
     try:
-        path.write_text(json.dumps(result.summary(), indent=2) + "\n", encoding="utf-8")
+        path.write_text(json.dumps(table, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         raise GraspAtlasError(f"cannot write '{path}': {error.strerror or error}") from None
 

@@ -1,4 +1,4 @@
-"""Contacts between hand and object, and a first grasp that fulfils them (Section II of the paper)."""
+"""Contacts between hand and object (Section II of the paper)."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.patches import Patch, patch_from_dict
-from graspatlas.tables import checked_table, number, numbers
+from graspatlas.tables import checked_table, number
 
-__all__ = ["Contact", "FirstGrasp"]
+__all__ = ["Contact"]
 
 
 @dataclass(frozen=True)
@@ -70,66 +70,3 @@ class Contact:
         )
         patches = [patch_from_dict(table[key]) for key in ("hand", "object")]
         return cls(str(table["frame"]), patches[0], patches[1], frozen, hand_frozen)
-
-
-@dataclass(frozen=True)
-class FirstGrasp:
-    """A feasible grasp x1 from which the atlas grows.
-
-    Attributes:
-        joints: Joint positions by name [rad or m]; all of the hand's.
-        object_xyz: Position of the object in the palm's frame [m].
-        object_quat_xyzw: Its rotation; normalised.
-        parameters: Free patch parameters in the order of x; found from the contact points when not given.
-    """
-
-    joints: Mapping[str, float]
-    object_xyz: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    object_quat_xyzw: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
-    parameters: tuple[float, ...] | None = None
-
-    def __post_init__(self) -> None:
-        checked_table(self.joints, "x1's joints", (), None)
-        numbers = [
-            *self.joints.values(),
-            *self.object_xyz,
-            *self.object_quat_xyzw,
-            *(self.parameters or ()),
-        ]
-        if not np.isfinite(np.asarray(numbers, float)).all():
-            raise GraspAtlasError("x1 holds a number that is not finite")
-        if len(self.object_xyz) != 3 or len(self.object_quat_xyzw) != 4:
-            raise GraspAtlasError("x1 needs object_xyz of 3 numbers and object_quat_xyzw of 4")
-        norm = float(np.linalg.norm(self.object_quat_xyzw))
-        if norm < 1e-6:
-            raise GraspAtlasError("x1 has a quaternion of length zero")
-        # One that is unit to rounding stays as it came, so that a stored problem is the same problem.
-        norm = 1.0 if abs(norm - 1.0) < 1e-12 else norm
-        x, y, z, w = (float(c) / norm for c in self.object_quat_xyzw)
-        object.__setattr__(self, "object_quat_xyzw", (x, y, z, w))
-
-    def to_dict(self) -> dict[str, Any]:
-        """The first grasp as plain data."""
-        return {
-            "joints": dict(self.joints),
-            "object_xyz": list(self.object_xyz),
-            "object_quat_xyzw": list(self.object_quat_xyzw),
-            "parameters": None if self.parameters is None else list(self.parameters),
-        }
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> FirstGrasp:
-        """The first grasp that :meth:`to_dict` described.
-
-        Raises:
-            GraspAtlasError: If something is missing or wrong.
-        """
-        table = checked_table(data, "x1", ("joints", "object_xyz", "object_quat_xyzw"), ("parameters",))
-        joints = checked_table(table["joints"], "x1's joints", (), None)
-        parameters = table.get("parameters")
-        return cls(
-            joints={name: number(value, f"joint '{name}' of x1") for name, value in joints.items()},
-            object_xyz=numbers(table["object_xyz"], "object_xyz"),  # type: ignore[arg-type]
-            object_quat_xyzw=numbers(table["object_quat_xyzw"], "object_quat_xyzw"),  # type: ignore[arg-type]
-            parameters=None if parameters is None else numbers(parameters, "parameters"),
-        )

@@ -22,6 +22,7 @@ from graspatlas.quality import Quality, evaluate, find_index, quality_name
 from graspatlas.refinement import refine as climb_peaks
 from graspatlas.requirements import Require, screen
 from graspatlas.result import Result
+from graspatlas.search import with_first_grasp
 from graspatlas.systems import AnySystem
 
 __all__ = ["build_atlas", "optimize"]
@@ -134,7 +135,8 @@ def optimize(
     What is not given comes from ``problem.defaults``.
 
     Args:
-        problem: The problem; see :func:`graspatlas.load_problem`.
+        problem: The problem; see :func:`graspatlas.load_problem`. Without x1 a first grasp is searched, and the result
+            carries it: see :func:`graspatlas.find_components` for all that there is.
         dimension: k, of the set of relevant grasps: 1 to t.
         radius: r, of a chart [rad, and lengths in units of ``problem.length_scale``].
         epsilon: See :func:`build_atlas`.
@@ -152,21 +154,20 @@ def optimize(
         the best of all that are connected to x1 and meet the requirements, up to the size of a chart.
 
     Raises:
-        GraspAtlasError: If an argument makes no sense, or the index fails.
+        GraspAtlasError: If an argument makes no sense, the index fails, or no first grasp is found.
 
     Source: "Global Optimization of Robotic Grasps", Algorithm 1.
     """
-    if not isinstance(problem, Problem):
-        raise GraspAtlasError(f"problem must be a graspatlas.Problem, got {type(problem).__name__}; see load_problem")
     chosen = {"dimension": dimension, "radius": radius, "epsilon": epsilon, "quality": quality}
-    options = _with_defaults(problem, chosen)
+    options = options_of(problem, chosen)
     first, *others = _indices(options["quality"])
     if refine not in (False, True, "relevant", "feasible"):
         raise GraspAtlasError(f"refine must be True, False, 'relevant' or 'feasible', got {refine!r}")
+    problem = with_first_grasp(problem, options["dimension"], max_seconds, progress)
     system = problem.system(options["dimension"])
     atlas = build_atlas(
         system,
-        problem.x1_array,
+        problem.start(options["dimension"]),
         radius=options["radius"],
         epsilon=options["epsilon"],
         max_charts=max_charts,
@@ -206,12 +207,19 @@ def _indices(quality: Quality | Sequence[Quality]) -> list[Quality]:
     return several
 
 
-def _with_defaults(problem: Problem, chosen: dict[str, Any]) -> dict[str, Any]:
-    """The options chosen, and the problem's defaults for those that are None."""
+def options_of(problem: Problem, chosen: dict[str, Any]) -> dict[str, Any]:
+    """The options chosen, and the problem's defaults for those that are None.
+
+    Raises:
+        GraspAtlasError: If neither gives one, or there is no such index.
+    """
+    if not isinstance(problem, Problem):
+        raise GraspAtlasError(f"problem must be a graspatlas.Problem, got {type(problem).__name__}; see load_problem")
     options = {key: problem.defaults.get(key) if value is None else value for key, value in chosen.items()}
     missing = [key for key, value in options.items() if value is None]
     if missing:
         raise GraspAtlasError(f"problem '{problem.name}' has no default for {', '.join(missing)}: give optimize these")
+    _indices(options["quality"])  # type: ignore[arg-type]
     return options
 
 

@@ -1,9 +1,9 @@
-"""A grasp problem: hand, object, contacts, hand motions and a first grasp (Sections II and III of the paper)."""
+"""A grasp problem: hand, object, contacts, hand motions, a first grasp (Sections II and III of the paper)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from pathlib import Path
@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graspatlas import _core
-from graspatlas.contacts import Contact, FirstGrasp
+from graspatlas.contacts import Contact
 from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.first_grasp import FirstGrasp, first_grasp_from_array, first_grasp_to_array, posture_array
 from graspatlas.hand import Body, Hand
 from graspatlas.motions import HandMotions
 from graspatlas.patches import Patch
-from graspatlas.tables import checked_table, number
+from graspatlas.tables import checked_table, number, number_array
 
 __all__ = ["Problem"]
 
@@ -33,6 +34,10 @@ OBJECT_JOINTS = ("free_flyer", "planar")
 DEFAULTS = ("dimension", "radius", "epsilon", "quality")
 #: How far a first grasp may break a joint limit or leave a patch [rad or m].
 LIMIT_TOLERANCE = 1e-9
+#: How far a first grasp may be off the hand motions that are frozen at the reference posture [rad].
+FROZEN_TOLERANCE = 1e-9
+#: Random configurations at which the rank of the contact equations is looked at when there is no x1.
+RANK_TRIES = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +49,9 @@ class Problem:
         hand: The hand.
         object: The object.
         contacts: The contacts, at least one.
-        x1: A feasible first grasp.
+        x1: A feasible first grasp; without one, :func:`graspatlas.find_grasps` finds some.
+        reference: Joint positions by name [rad or m] through which the hand motions that are kept pass: x_1,h of
+            eq (13). By default those of x1; without x1 the mean of the hand motions, moved within the joint limits.
         motions: Principal hand motions; without them only the full dimension t can be traced.
         object_joint: How the object moves: ``"free_flyer"``, or ``"planar"`` for problems in the palm's x-y plane.
         length_scale: Length that counts as much as one radian [m].
@@ -52,15 +59,16 @@ class Problem:
         description, source: For people.
 
     Raises:
-        GraspAtlasError: If a contact names no frame of the hand, or x1 misses its contacts or breaks a limit.
+        GraspAtlasError: If a contact names no frame of the hand, x1 misses its contacts, or a limit is broken.
     """
 
     name: str
     hand: Hand
     object: Body
     contacts: tuple[Contact, ...]
-    x1: FirstGrasp
+    x1: FirstGrasp | None = None
     motions: HandMotions | None = None
+    reference: Mapping[str, float] | None = None
     object_joint: str = "free_flyer"
     length_scale: float = 0.01
     defaults: Mapping[str, Any] = field(default_factory=dict)
@@ -76,38 +84,46 @@ class Problem:
         if self.object_joint not in OBJECT_JOINTS:
             raise unknown_name("object joint", self.object_joint, OBJECT_JOINTS)
         self._check_joints()
-        self._check_plane()
         for contact in self.contacts:
             self.hand.frame(contact.frame)
-        self._check_x1()
+        self._check_reference()
+        if self.x1 is not None:
+            self._check_x1(self.x1)
 
     def _check_joints(self) -> None:
-        for name in self.x1.joints:
-            if name not in self.hand.joints:
-                raise unknown_name("joint", name, self.hand.joints, f"in hand '{self.hand.name}'")
         for joint in self.hand.model.hand_joints:
             if joint.v_size != 1:
                 raise GraspAtlasError(
                     f"joint '{joint.name}' of hand '{self.hand.name}' has {joint.v_size} degrees of freedom; "
                     "a hand's joints must have one each"
                 )
-        missing = [name for name in self.hand.joints if name not in self.x1.joints]
-        if missing:
-            raise GraspAtlasError(f"x1 gives no position for joint '{missing[0]}' of hand '{self.hand.name}'")
         if self.motions and set(self.motions.joints) != set(self.hand.joints):
             odd = sorted(set(self.motions.joints) ^ set(self.hand.joints))[0]
             raise GraspAtlasError(
                 f"the hand motions and hand '{self.hand.name}' do not have the same joints: see '{odd}'"
             )
 
-    def _check_plane(self) -> None:
-        x, y, _, _ = self.x1.object_quat_xyzw
-        if self.object_joint == "planar" and max(abs(self.x1.object_xyz[2]), abs(x), abs(y)) > 1e-9:
+    def _check_reference(self) -> None:
+        if self.reference is None:
+            return
+        named = checked_table(self.reference, "the reference posture", (), None)
+        if not np.isfinite([number(value, f"joint '{name}' of the reference") for name, value in named.items()]).all():
+            raise GraspAtlasError("the reference posture holds a number that is not finite")
+        q, (lower, upper) = self.reference_array, self.hand.joint_limits
+        for joint in self.hand.model.hand_joints:
+            at = joint.q_index
+            if joint.q_size == 1 and not lower[at] - LIMIT_TOLERANCE <= q[at] <= upper[at] + LIMIT_TOLERANCE:
+                raise GraspAtlasError(
+                    f"the reference posture of problem '{self.name}' has joint '{joint.name}' at {q[at]:.4g}, outside "
+                    f"its limits [{lower[at]:.4g}, {upper[at]:.4g}]"
+                )
+
+    def _check_x1(self, x1: FirstGrasp) -> None:
+        x, y, _, _ = x1.object_quat_xyzw
+        if self.object_joint == "planar" and max(abs(x1.object_xyz[2]), abs(x), abs(y)) > 1e-9:
             raise GraspAtlasError(
                 "in a planar problem x1's object lies in the x-y plane: z = 0, and turned about z only"
             )
-
-    def _check_x1(self) -> None:
         slack = self.full_system.slack(self.x1_array)
         if slack.size and slack.min() < -LIMIT_TOLERANCE:
             broken = [
@@ -157,17 +173,27 @@ class Problem:
 
     @cached_property
     def full_dimension(self) -> int:
-        """t: dimension of the manifold F of feasible grasps at x1, from the rank of its Jacobian."""
-        system = self.full_system
-        singular = np.linalg.svd(system.evaluate_jacobian(self.x1_array), compute_uv=False)
-        rank = int((singular > 1e-8 * singular[0]).sum())
+        """t: dimension of the manifold F of feasible grasps, from the rank of its Jacobian.
+
+        That is the rank at x1; without x1 the largest at random configurations, in contact or not.
+        """
+        system, place = self.full_system, "at x1" if self.x1 is not None else "anywhere"
+        points = [self.x1_array] if self.x1 is not None else self._random_points(RANK_TRIES)
+        rank = max(_rank(system.evaluate_jacobian(x)) for x in points)
         if rank < system.n_equations:
             raise GraspAtlasError(
-                f"the {system.n_equations} contact equations of problem '{self.name}' have rank {rank} at x1: "
+                f"the {system.n_equations} contact equations of problem '{self.name}' have rank {rank} {place}: "
                 "a contact is stated twice, or x1 is a singular posture (symmetric or straight ones often are); drop "
                 "the redundant contact or bend some fingers"
             )
         return system.dimension
+
+    def _random_points(self, count: int) -> list[Array]:
+        """Configurations round the reference posture that touch nothing; their bounds are not looked at."""
+        system, rng = self.full_system, np.random.default_rng(0)
+        pose = [0.0, 0.0, 1.0, 0.0] if self.object_joint == "planar" else [0.0] * 6 + [1.0]
+        x = np.r_[self.reference_array, pose, np.zeros(system.n_parameters)]
+        return [system.integrate(x, rng.normal(size=system.tangent_size)) for _ in range(count)]
 
     def frozen_motions(self, dimension: int) -> int:
         """How many hand motions are frozen for a manifold of dimension k: s = t - k (eq 12).
@@ -206,112 +232,105 @@ class Problem:
             orthonormal, R = np.linalg.qr(motions / self._joint_units[:, None])
             motions = self._joint_units[:, None] * orthonormal * np.sign(np.diag(R))
         sides = []
-        for contact, parameters in zip(self.contacts, self._x1_parameters, strict=True):
+        for contact in self.contacts:
             joint, T = self.hand.frame(contact.frame)
-            hand = self._side(joint, T, contact.hand, contact.hand_frozen, parameters[0])
-            body = self._side(model.object_joint, np.eye(4), contact.object, contact.frozen, parameters[1])
+            hand = self._side(joint, T, contact.hand, contact.hand_frozen)
+            body = self._side(model.object_joint, np.eye(4), contact.object, contact.frozen)
             sides.append((hand, body))
         lower, upper = self.hand.joint_limits
         return _core.GraspSystem(model, sides, motions, self.length_scale, list(lower), list(upper))
 
     @staticmethod
-    def _side(
-        joint: int, T: Array, patch: Patch, frozen: Mapping[str, float], at_x1: tuple[float, float]
-    ) -> _core.ContactSide:
+    def _side(joint: int, T: Array, patch: Patch, frozen: Mapping[str, float]) -> _core.ContactSide:
         parameters = []
-        for name, value in zip(("u", "v"), at_x1, strict=True):
+        for name in ("u", "v"):
             free = name in patch.parameters and name not in frozen
             interval = patch.interval(name) if free else None
             low, high = interval or (-np.pi, np.pi)
+            value = float(frozen.get(name, 0.0))
             parameters.append(_core.PatchParameter(free, value, free and interval is None, low, high))
         return _core.ContactSide(joint, T, patch.core(), *parameters)
 
     @cached_property
-    def _x1_parameters(self) -> list[tuple[tuple[float, float], tuple[float, float]]]:
-        """(u, v) of the hand's and of the object's patch of each contact at x1."""
-        given = iter(self.x1.parameters) if self.x1.parameters is not None else None
-        T_object = self._T_object
-        q = self._q_hand
-        places = self.hand.link_placements(q)
-        out = []
-        for contact in self.contacts:
-            T_frame = places[contact.frame]
-            hand_guess = contact.hand.locate(_apply(_inverse(T_frame), T_object[:3, 3]))
-            hand = self._parameters(contact.hand, contact.hand_frozen, hand_guess, given)
-            touch = _apply(T_frame, contact.hand.point(*hand))
-            body_guess = contact.object.locate(_apply(_inverse(T_object), touch))
-            out.append((hand, self._parameters(contact.object, contact.frozen, body_guess, given)))
-        if given is not None and next(given, None) is not None:
-            raise GraspAtlasError(f"x1 gives {len(self.x1.parameters or ())} patch parameters, more than are free")
-        return out
-
-    @staticmethod
-    def _parameters(
-        patch: Patch, frozen: Mapping[str, float], guess: tuple[float, float], given: Any
-    ) -> tuple[float, float]:
-        values = []
-        for name, value in zip(("u", "v"), guess, strict=True):
-            if name in frozen:
-                values.append(float(frozen[name]))
-            elif name in patch.parameters and given is not None:
-                number = next(given, None)
-                if number is None:
-                    raise GraspAtlasError("x1 gives fewer patch parameters than are free")
-                values.append(float(number))
-            else:
-                values.append(value)
-        return (values[0], values[1])
-
-    @cached_property
-    def _q_hand(self) -> Array:
-        q = np.array(self.hand.model.neutral, float)
+    def reference_posture(self) -> Mapping[str, float]:
+        """Joint positions by name [rad or m] through which the hand motions that are kept pass; see ``reference``."""
+        if self.reference is not None:
+            return self.reference
+        if self.x1 is not None:
+            return self.x1.joints
+        lower, upper = self.hand.joint_limits
+        mean = dict(zip(self.motions.joints, self.motions.mean, strict=True)) if self.motions else {}
+        posture = {}
         for joint in self.hand.model.hand_joints:
-            value = self.x1.joints[joint.name]
-            if joint.q_size == 2:
-                q[joint.q_index : joint.q_index + 2] = np.cos(value), np.sin(value)
-            else:
-                q[joint.q_index] = value
-        return q
+            value, at = float(mean.get(joint.name, 0.0)), joint.q_index
+            posture[joint.name] = value if joint.q_size == 2 else float(np.clip(value, lower[at], upper[at]))
+        return posture
 
     @cached_property
-    def _T_object(self) -> Array:
-        T = np.eye(4)
-        x, y, z, w = self.x1.object_quat_xyzw
-        v = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        T[:3, :3] = np.eye(3) + 2.0 * w * v + 2.0 * v @ v
-        T[:3, 3] = self.x1.object_xyz
-        return T
+    def reference_array(self) -> Array:
+        """The reference posture as a joint configuration [nq]."""
+        return posture_array(self.hand, self.reference_posture, "the reference posture")
 
     @cached_property
     def x1_array(self) -> Array:
         """x1 as the vector [q_hand, q_object, free patch parameters], in Pinocchio's conventions.
 
         q_object is position and quaternion (x, y, z, w) of a free flyer, and (x, y, cos, sin) in the plane.
+
+        Raises:
+            GraspAtlasError: If the problem has no x1.
         """
-        free = []
-        for contact, (hand, body) in zip(self.contacts, self._x1_parameters, strict=True):
-            for patch, frozen, values in (
-                (contact.hand, contact.hand_frozen, hand),
-                (contact.object, contact.frozen, body),
-            ):
-                free += [values["uv".index(name)] for name in patch.parameters if name not in frozen]
-        if self.object_joint == "planar":
-            _, _, z, w = self.x1.object_quat_xyzw
-            pose = [*self.x1.object_xyz[:2], w * w - z * z, 2.0 * w * z]
-        else:
-            pose = [*self.x1.object_xyz, *self.x1.object_quat_xyzw]
-        return np.array([*self._q_hand, *pose, *free])
+        if self.x1 is None:
+            raise GraspAtlasError(
+                f"problem '{self.name}' has no first grasp x1: give one, or take one that is found, as in "
+                "problem.at(graspatlas.find_grasps(problem)[0])"
+            )
+        return first_grasp_to_array(self.x1, self.hand, self.contacts, self.object_joint)
+
+    def at(self, x: ArrayLike) -> Problem:
+        """The same problem with another first grasp; the hand motions that are kept pass where they did.
+
+        Without x1 and reference they pass where x has the hand, so that any feasible grasp will do; grasps found with
+        hand motions frozen already lie on them.
+
+        Args:
+            x: A feasible grasp [size of x], such as one of :func:`graspatlas.find_grasps`.
+
+        Raises:
+            GraspAtlasError: If x has another size, misses its contacts or breaks a limit.
+        """
+        size = self.full_system.configuration_size
+        point = number_array(x, "x")
+        if point.shape != (size,) or not np.isfinite(point).all():
+            raise GraspAtlasError(f"a grasp of problem '{self.name}' has {size} finite numbers, got {point!r}")
+        reference = self.reference if self.x1 is None else self.reference_posture
+        return replace(self, x1=first_grasp_from_array(point, self.hand, self.object_joint), reference=reference)
+
+    def start(self, dimension: int) -> Array:
+        """x1 as the point from which the atlas of this dimension grows.
+
+        Raises:
+            GraspAtlasError: If there is no x1, or it lies off the hand motions kept, which pass through the reference.
+        """
+        x1 = self.x1_array
+        off = float(np.abs(self.frozen_residual(x1, dimension)).max(initial=0.0))
+        if off > FROZEN_TOLERANCE:
+            raise GraspAtlasError(
+                f"x1 of problem '{self.name}' is {off:.3g} rad off the {self.frozen_motions(dimension)} hand motions "
+                "that are frozen at the reference posture, eq (13): leave out the reference, or x1"
+            )
+        return x1
 
     def frozen_residual(self, X: ArrayLike, dimension: int) -> Array:
-        """Eq (13), E_s' (q_hand - q_hand,1), at grasps X [n, size of x]: [n, s], zero on R."""
+        """Eq (13), E_s' (q_hand - reference), at grasps X [n, size of x]: [n, s], zero on R."""
         s = self.frozen_motions(dimension)
         rows = np.atleast_2d(np.asarray(X, float))
         if s == 0 or self.motions is None:
             return np.zeros((len(rows), 0))
         E_s = self.motions.reordered(self.hand.joints).frozen(s)
-        difference = self.full_system.difference
+        difference, q = self.full_system.difference, self.reference_array
         nv = self.hand.model.hand_v_size
-        residuals = np.array([(self._joint_units * difference(self.x1_array, x)[:nv]) @ E_s for x in rows])
+        residuals = np.array([(self._joint_units * difference(np.r_[q, x[len(q) :]], x)[:nv]) @ E_s for x in rows])
         # A continuous joint may have gone round: of all its turns, the one that fits.
         turning = [joint.v_index for joint in self.hand.model.hand_joints if joint.q_size == 2 and joint.v_size == 1]
         turns = np.array(list(product((0, -1, 1), repeat=len(turning)))) * 2.0 * np.pi
@@ -321,7 +340,7 @@ class Problem:
 
     def to_dict(self) -> dict[str, Any]:
         """The problem as plain data that :meth:`from_dict` reads, with the text of its URDFs."""
-        return {
+        table = {
             "name": self.name,
             "description": self.description,
             "source": self.source,
@@ -330,9 +349,10 @@ class Problem:
             "length_scale": self.length_scale,
             "contacts": [contact.to_dict() for contact in self.contacts],
             "hand_motions": self.motions.to_dict() if self.motions else None,
-            "x1": self.x1.to_dict(),
+            "x1": self.x1.to_dict() if self.x1 is not None else None,
             "defaults": dict(self.defaults),
         }
+        return table if self.reference is None else {**table, "reference": dict(self.reference)}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], folder: Path | None = None) -> Problem:
@@ -345,8 +365,8 @@ class Problem:
         Raises:
             GraspAtlasError: If something is missing or wrong.
         """
-        optional = ("description", "source", "length_scale", "hand_motions", "defaults")
-        table = checked_table(data, "the problem", ("name", "hand", "object", "contacts", "x1"), optional)
+        optional = ("description", "source", "length_scale", "hand_motions", "defaults", "x1", "reference")
+        table = checked_table(data, "the problem", ("name", "hand", "object", "contacts"), optional)
         body = dict(checked_table(table["object"], "the object", ("urdf",), None))
         object_joint = str(body.pop("joint", "free_flyer"))
         motions = table.get("hand_motions")
@@ -358,7 +378,8 @@ class Problem:
             object=Body.from_dict(body, folder),
             object_joint=object_joint,
             contacts=tuple(Contact.from_dict(item) for item in table["contacts"]),
-            x1=FirstGrasp.from_dict(table["x1"]),
+            x1=FirstGrasp.from_dict(table["x1"]) if table.get("x1") is not None else None,
+            reference=table.get("reference"),
             motions=HandMotions.from_dict(motions) if motions else None,
             length_scale=number(table.get("length_scale", 0.01), "length_scale"),
             defaults=dict(checked_table(table.get("defaults") or {}, "defaults", (), DEFAULTS)),
@@ -367,12 +388,6 @@ class Problem:
         )
 
 
-def _apply(T: Array, point: ArrayLike) -> Array:
-    return np.asarray(T[:3, :3] @ np.asarray(point) + T[:3, 3])
-
-
-def _inverse(T: Array) -> Array:
-    inverse = np.eye(4)
-    inverse[:3, :3] = T[:3, :3].T
-    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
-    return inverse
+def _rank(J: Array) -> int:
+    singular = np.linalg.svd(J, compute_uv=False)
+    return int((singular > 1e-8 * singular[0]).sum())

@@ -51,14 +51,14 @@ def batched(index: F) -> F:
 def _axes(grasps: Grasps, length_unit: float) -> Array:
     """Semi-axes over the motions that are usually coordinated [n, connectivity]; zero where a grasp has lost one.
 
-    What is usual is the largest connectivity of x1 and of the grasps at hand.
+    What is usual is the largest connectivity of x1, if there is one, and of the grasps at hand.
     """
     if not (np.isfinite(length_unit) and length_unit > 0.0):
         raise GraspAtlasError(f"length_unit must be positive, got {length_unit}")
-    x1 = grasps.problem.x1_array
-    axes = np.asarray(_core.semi_axes(grasps.system, np.vstack([x1, grasps.x]), length_unit))
+    x1 = [] if grasps.problem.x1 is None else [grasps.problem.x1_array]
+    axes = np.asarray(_core.semi_axes(grasps.system, np.vstack([*x1, grasps.x]), length_unit))
     connectivity = int((axes > 0.0).sum(axis=1).max())
-    return axes[1:, axes.shape[1] - connectivity :]
+    return axes[len(x1) :, axes.shape[1] - connectivity :]
 
 
 @batched
