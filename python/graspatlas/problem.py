@@ -18,6 +18,7 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand import Body, Hand
 from graspatlas.motions import HandMotions
 from graspatlas.patches import Patch
+from graspatlas.patches.touch import touching_parameters
 from graspatlas.tables import checked_table, number
 
 __all__ = ["Problem"]
@@ -236,6 +237,10 @@ class Problem:
         out = []
         for contact in self.contacts:
             T_frame = places[contact.frame]
+            if given is None and set(contact.hand_frozen) != set(contact.hand.parameters):
+                T_hand_object = _inverse(T_frame) @ T_object
+                out.append(touching_parameters(contact, T_hand_object, self.length_scale))
+                continue
             hand_guess = contact.hand.locate(_apply(_inverse(T_frame), T_object[:3, 3]))
             hand = self._parameters(contact.hand, contact.hand_frozen, hand_guess, given)
             touch = _apply(T_frame, contact.hand.point(*hand))
