@@ -28,7 +28,7 @@ SAMPLES = 65
 SMOOTHING = 1e-4
 #: Normals of the region may turn by this much from that of the centre [rad]: 80 degrees.
 LARGEST_TURN = np.radians(80.0)
-#: The tangent plane is that of the faces within this share of the size from the centre.
+#: The tangent plane is the mean of the faces within this share of the size, the more the nearer they are.
 TANGENT_SHARE = 0.25
 #: Two layers of the region over one point are one when they are no farther apart than this share of the size.
 SAME_HEIGHT = 1e-3
@@ -179,11 +179,10 @@ def _tangent_frame(triangles: Array, center: Array, half: float, u_hint: Vector3
         )
     origin = nearest_points[nearest]
     normals = _normals(triangles)
-    near = np.linalg.norm(nearest_points - origin, axis=1) <= TANGENT_SHARE * half
-    near &= normals @ normals[nearest] > np.cos(LARGEST_TURN)
-    near[nearest] = True
+    nearness = 1.0 - (np.linalg.norm(nearest_points - origin, axis=1) / (TANGENT_SHARE * half)) ** 2
+    near = (nearness > 0.0) & (normals @ normals[nearest] > np.cos(LARGEST_TURN))
     areas = np.linalg.norm(np.cross(*_edges(triangles[near])), axis=1)
-    normal = areas @ normals[near]
+    normal = (areas * nearness[near]) @ normals[near]
     T = placement((0.0, 0.0, 0.0), tuple(normal / np.linalg.norm(normal)), u_hint)
     return nearest, origin, np.column_stack([T[:3, 0], -T[:3, 2], T[:3, 1]])
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, ClassVar
 
@@ -33,7 +33,7 @@ DOMAIN_TOLERANCE = 1e-12
 class _TensorProduct(FlippablePatch):
     """o(u, v) = sum over i, j of N_i(u) N_j(v) P_ij, with the normal along o_u x o_v."""
 
-    control_points: ControlPoints = ()
+    control_points: ControlPoints = field(default=(), repr=False)
     u_interval: Interval | None = None
     v_interval: Interval | None = None
     parameters: ClassVar[tuple[str, ...]] = ("u", "v")
