@@ -19,7 +19,7 @@ from graspatlas.tables import number_array
 __all__ = ["Curve"]
 
 #: Points between two given ones at which a curve is measured and checked.
-SAMPLES = 33
+SAMPLES = 129
 #: How far a curve may leave its patch's intervals [rad, m or number].
 INTERVAL_TOLERANCE = 1e-9
 #: Shortest piece of a curve [m].
