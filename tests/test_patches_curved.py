@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from math import comb
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import NdBSpline
 
+import graspatlas as ga
 from graspatlas import GraspAtlasError
 from graspatlas.patches import (
     Bezier,
@@ -266,3 +268,20 @@ def test_curves_lie_on_surfaces_only():
 def test_a_cap_is_refused_where_it_reaches_its_poles():
     with pytest.raises(GraspAtlasError, match="pole"):
         Sphere.cap((0, 0, 0), (0, 0, 1), 0.01, half_angle=1.6)
+
+
+def test_grasps_on_a_curve_are_those_of_the_frozen_parameter(can):
+    """The index finger slides round the can at one height: as a curve on it, and with the height frozen."""
+    u, v = map(float, can.x1_array[-4:-2])
+    cylinder = can.contacts[1].object
+    arc = Cylinder(radius=cylinder.radius, u_interval=(u - 1.0, u + 1.0))
+    bests = []
+    for surface, frozen in ((arc, {"v": v}), (Curve(arc, ((u - 1.0, v), (u + 1.0, v))), {})):
+        contacts = [*can.contacts]
+        contacts[1] = replace(contacts[1], object=surface, frozen=frozen)
+        problem = replace(can, contacts=tuple(contacts))
+        assert problem.full_dimension == can.full_dimension - 1
+        result = ga.optimize(problem, dimension=2, radius=0.1, epsilon=0.5, quality="smallest_semi_axis")
+        assert result.is_global
+        bests.append(ga.climb(result, result.best.chart).quality)
+    assert bests[1] == pytest.approx(bests[0], rel=1e-3)
