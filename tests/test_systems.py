@@ -11,11 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import graspatlas as ga
-from graspatlas import _core
-from graspatlas.patches import Cone, Cylinder, Patch, Plane, Point, Revolution
+from graspatlas import _core, patches
+from graspatlas.patches import Bezier, BSpline, Cone, Curve, Cylinder, Ellipsoid, Patch, Plane, Point, Revolution
 from graspatlas.systems import Angles, Rotations, Sphere, Torus, jacobian_error
 
 AXIS = {"origin": (0.001, -0.002, 0.003), "axis": (0.3, 0.9, -0.2), "u_axis": (0.7, 0.1, 0.7)}
+SHEET = np.random.default_rng(1).normal(0.0, 0.002, (5, 4, 3))
+SHEET[..., 0] += np.linspace(-0.03, 0.03, 5)[:, None]
+SHEET[..., 2] += np.linspace(-0.02, 0.02, 4)
 PATCHES: dict[str, Patch] = {
     "point": Point((0.01, 0.002, 0.004), (0.2, -0.3, 0.9)),
     "plane": Plane((0.01, 0.0, 0.004), (0.1, 0.9, 0.2), (0.5, 0.1, 0.3), (-0.03, 0.02), (-0.01, 0.04)),
@@ -23,6 +26,18 @@ PATCHES: dict[str, Patch] = {
     "arc of a cylinder": Cylinder(radius=0.02, u_interval=(-1.0, 2.0), v_interval=(-0.03, 0.04), **AXIS),
     "cone": Cone(heights=(-0.02, 0.05), radii=(0.01, 0.04), **AXIS),
     "revolution": Revolution(heights=(-0.02, 0.0, 0.01, 0.03), radii=(0.015, 0.02, 0.018, 0.03), **AXIS),
+    "sphere": patches.Sphere(radius=0.02, **AXIS),
+    "torus": patches.Torus(ring_radius=0.03, tube_radius=0.01, flipped=True, **AXIS),
+    "ellipsoid": Ellipsoid(semi_axes=(0.02, 0.03, 0.04), **AXIS),
+    "bezier": Bezier(control_points=SHEET),
+    "bspline": BSpline(control_points=SHEET, degrees=(3, 2), u_interval=(0.1, 0.8), flipped=True),
+    "bspline in metres": BSpline(
+        control_points=SHEET,
+        u_knots=(-0.03,) * 4 + (0.0,) + (0.03,) * 4,
+        v_knots=(-0.02,) * 4 + (0.03,) * 4,
+        unit="m",
+    ),
+    "curve": Curve(patches.Sphere(radius=0.02, **AXIS), ((-0.5, -0.3), (0.2, 0.4), (0.9, 0.3))),
 }
 Names = tuple[str, ...]
 HAND = robot(
@@ -57,7 +72,8 @@ def contact_system(
 
 
 def frees(patch: str) -> list[tuple[str, ...]]:
-    return [()] if patch == "point" else [(), ("u",), ("v",), ("u", "v")]
+    names = PATCHES[patch].parameters
+    return [(), *((name,) for name in names), *([names] if len(names) == 2 else [])]
 
 
 ON_OBJECT = [("point", (), body, free, motions) for body in PATCHES for free in frees(body) for motions in (5, 4)]
@@ -315,5 +331,6 @@ def test_bases_are_orthonormal_and_tangent():
 
 def test_patch_kinds_are_all_covered():
     kinds = {PATCHES[name].kind for contact in CONTACTS for name in (contact[0], contact[2])}
-    assert kinds == {"point", "plane", "cylinder", "cone", "revolution"}
+    classes = [cls for cls in vars(patches).values() if isinstance(cls, type) and issubclass(cls, Patch)]
+    assert kinds == {cls.kind for cls in classes if cls is not Patch}
     assert {len(contact[1]) for contact in CONTACTS} == {len(contact[3]) for contact in CONTACTS} == {0, 1, 2}

@@ -6,7 +6,10 @@
 #include <string>
 
 #include "bindings.hpp"
+#include "graspatlas/grasp/bspline_patch.hpp"
+#include "graspatlas/grasp/derived_patch.hpp"
 #include "graspatlas/grasp/grasp_system.hpp"
+#include "graspatlas/grasp/round_patch.hpp"
 
 namespace py = pybind11;
 
@@ -33,6 +36,12 @@ ObjectJoint object_joint_from(const std::string& name) {
   if (name == "planar") return ObjectJoint::planar;
   if (name == "none") return ObjectJoint::none;
   throw Error("the object's joint is 'free_flyer', 'planar' or 'none', not '" + name + "'");
+}
+
+ParameterUnit unit_from(const std::string& name) {
+  if (name == "number") return ParameterUnit::number;
+  if (name == "m") return ParameterUnit::length;
+  throw Error("the unit of a B-spline's parameters is 'number' or 'm', not '" + name + "'");
 }
 
 using Stack = py::array_t<double>;
@@ -127,9 +136,11 @@ void bind_model(py::module_& module) {
           py::arg("q"), "Frame name -> T_world_frame [4 x 4] at q.");
 }
 
+using Cubics = Eigen::Matrix<double, Eigen::Dynamic, 4>;
+using Points3 = Eigen::Matrix<double, Eigen::Dynamic, 3>;
+
 void bind_patches(py::module_& module) {
   py::class_<Patch, py::smart_holder>(module, "Patch", "A parametrised piece of surface.")
-      .def_property_readonly("u_is_angle", &Patch::u_is_angle, "True when u is an angle, False when it is a length.")
       .def(
           "evaluate",
           [](const Patch& patch, double u, double v) {
@@ -147,11 +158,40 @@ void bind_patches(py::module_& module) {
            py::arg("T"));
   py::class_<RevolutionPatch, Patch, py::smart_holder>(module, "RevolutionPatch",
                                                        "A surface of revolution about y of a placement.")
-      .def(py::init([](const Eigen::Matrix4d& T, const std::vector<double>& breaks,
-                       const Eigen::Matrix<double, Eigen::Dynamic, 4>& coefficients) {
+      .def(py::init([](const Eigen::Matrix4d& T, const std::vector<double>& breaks, const Cubics& coefficients) {
              return std::make_unique<RevolutionPatch>(placement_from(T), breaks, coefficients);
            }),
            py::arg("T"), py::arg("breaks"), py::arg("coefficients"));
+  py::class_<TorusPatch, Patch, py::smart_holder>(module, "TorusPatch",
+                                                  "A torus about y of a placement; a sphere with a ring of radius 0.")
+      .def(py::init([](const Eigen::Matrix4d& T, double ring, double tube) {
+             return std::make_unique<TorusPatch>(placement_from(T), ring, tube);
+           }),
+           py::arg("T"), py::arg("ring_radius"), py::arg("tube_radius"));
+  py::class_<EllipsoidPatch, Patch, py::smart_holder>(module, "EllipsoidPatch",
+                                                      "An ellipsoid with its semi-axes along x, y, z of a placement.")
+      .def(py::init([](const Eigen::Matrix4d& T, const Eigen::Vector3d& semi_axes) {
+             return std::make_unique<EllipsoidPatch>(placement_from(T), semi_axes);
+           }),
+           py::arg("T"), py::arg("semi_axes"));
+  py::class_<BSplinePatch, Patch, py::smart_holder>(module, "BSplinePatch", "A tensor-product B-spline.")
+      .def(py::init([](std::pair<int, int> degrees, const std::vector<double>& u_knots,
+                       const std::vector<double>& v_knots, const Points3& control_points, const std::string& unit) {
+             return std::make_unique<BSplinePatch>(BSplineBasis(degrees.first, u_knots),
+                                                   BSplineBasis(degrees.second, v_knots), control_points,
+                                                   unit_from(unit));
+           }),
+           py::arg("degrees"), py::arg("u_knots"), py::arg("v_knots"), py::arg("control_points"), py::arg("unit"));
+  py::class_<FlippedPatch, Patch, py::smart_holder>(module, "FlippedPatch", "A patch with the opposite normal.")
+      .def(py::init([](std::shared_ptr<Patch> patch) { return std::make_unique<FlippedPatch>(std::move(patch)); }),
+           py::arg("patch"));
+  py::class_<CurvePatch, Patch, py::smart_holder>(module, "CurvePatch", "A curve u(s), v(s) on a patch.")
+      .def(py::init(
+               [](std::shared_ptr<Patch> patch, const std::vector<double>& breaks, const Cubics& u, const Cubics& v) {
+                 return std::make_unique<CurvePatch>(std::move(patch), PiecewiseCubic(breaks, u, "a curve"),
+                                                     PiecewiseCubic(breaks, v, "a curve"));
+               }),
+           py::arg("patch"), py::arg("breaks"), py::arg("u"), py::arg("v"));
   py::class_<PatchParameter>(module, "PatchParameter", "One parameter of a patch: frozen, or an unknown.")
       .def(py::init<bool, double, bool, double, double>(), py::arg("free"), py::arg("value"), py::arg("periodic"),
            py::arg("lower"), py::arg("upper"));

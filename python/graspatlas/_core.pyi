@@ -12,7 +12,11 @@ __all__: list[str] = [
     "Angles",
     "AnySystem",
     "AtlasBuilder",
+    "BSplinePatch",
     "ContactSide",
+    "CurvePatch",
+    "EllipsoidPatch",
+    "FlippedPatch",
     "GraspAtlasError",
     "GraspSystem",
     "JointInfo",
@@ -27,6 +31,7 @@ __all__: list[str] = [
     "Rotations",
     "Sphere",
     "Torus",
+    "TorusPatch",
     "force_closure_margins",
     "project",
     "semi_axes",
@@ -324,11 +329,6 @@ class Patch:
         """
         Point o, normal m, tangents a and b, and their derivatives by u and v.
         """
-    @property
-    def u_is_angle(self) -> bool:
-        """
-        True when u is an angle, False when it is a length.
-        """
 
 class PlanePatch(Patch):
     """
@@ -345,6 +345,58 @@ class RevolutionPatch(Patch):
         T: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
         breaks: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
         coefficients: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 4]"],
+    ) -> None: ...
+
+class TorusPatch(Patch):
+    """
+    A torus about y of a placement; a sphere with a ring of radius 0.
+    """
+    def __init__(
+        self,
+        T: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
+        ring_radius: typing.SupportsFloat | typing.SupportsIndex,
+        tube_radius: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+
+class EllipsoidPatch(Patch):
+    """
+    An ellipsoid with its semi-axes along x, y, z of a placement.
+    """
+    def __init__(
+        self,
+        T: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
+        semi_axes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+    ) -> None: ...
+
+class BSplinePatch(Patch):
+    """
+    A tensor-product B-spline.
+    """
+    def __init__(
+        self,
+        degrees: tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex],
+        u_knots: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+        v_knots: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+        control_points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+        unit: str,
+    ) -> None: ...
+
+class FlippedPatch(Patch):
+    """
+    A patch with the opposite normal.
+    """
+    def __init__(self, patch: Patch) -> None: ...
+
+class CurvePatch(Patch):
+    """
+    A curve u(s), v(s) on a patch.
+    """
+    def __init__(
+        self,
+        patch: Patch,
+        breaks: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+        u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 4]"],
+        v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 4]"],
     ) -> None: ...
 
 class PatchParameter:

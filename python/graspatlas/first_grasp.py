@@ -13,6 +13,7 @@ from graspatlas.contacts import Contact
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand import Hand
 from graspatlas.patches import Patch
+from graspatlas.patches.touch import touching_parameters
 from graspatlas.tables import checked_table, number, numbers
 
 __all__ = ["FirstGrasp", "first_grasp_from_array", "first_grasp_to_array", "posture_array"]
@@ -110,7 +111,9 @@ def posture_array(hand: Hand, joints: Mapping[str, float], what: str) -> Array:
     return q
 
 
-def first_grasp_to_array(x1: FirstGrasp, hand: Hand, contacts: Sequence[Contact], object_joint: str) -> Array:
+def first_grasp_to_array(
+    x1: FirstGrasp, hand: Hand, contacts: Sequence[Contact], object_joint: str, length_scale: float
+) -> Array:
     """x1 as the vector [q_hand, q_object, free patch parameters], in Pinocchio's conventions.
 
     Parameters that x1 does not give are those of the patch points nearest to each other.
@@ -127,18 +130,25 @@ def first_grasp_to_array(x1: FirstGrasp, hand: Hand, contacts: Sequence[Contact]
     if x1.parameters is not None and len(x1.parameters) != free:
         how = "more" if len(x1.parameters) > free else "fewer"
         raise GraspAtlasError(f"x1 gives {len(x1.parameters)} patch parameters, {how} than the {free} that are free")
-    parameters = x1.parameters if x1.parameters is not None else _nearest_parameters(x1, hand, q, contacts)
+    parameters = (
+        x1.parameters if x1.parameters is not None else [*_nearest_parameters(x1, hand, q, contacts, length_scale)]
+    )
     return np.array([*q, *pose, *parameters])
 
 
-def _nearest_parameters(x1: FirstGrasp, hand: Hand, q: Array, contacts: Sequence[Contact]) -> Iterator[float]:
+def _nearest_parameters(
+    x1: FirstGrasp, hand: Hand, q: Array, contacts: Sequence[Contact], length_scale: float
+) -> Iterator[float]:
     """Free patch parameters at which hand and object touch, or nearly so."""
     places, T_object = hand.link_placements(q), _pose(x1)
     for contact in contacts:
         T_frame = places[contact.frame]
-        on_hand = _at(contact.hand, contact.hand_frozen, _apply(_inverse(T_frame), T_object[:3, 3]))
-        touch = _apply(T_frame, contact.hand.point(*on_hand))
-        on_object = _at(contact.object, contact.frozen, _apply(_inverse(T_object), touch))
+        if set(contact.hand_frozen) == set(contact.hand.parameters):
+            on_hand = _at(contact.hand, contact.hand_frozen, np.zeros(3))
+            touch = _apply(T_frame, contact.hand.point(*on_hand))
+            on_object = _at(contact.object, contact.frozen, _apply(_inverse(T_object), touch))
+        else:
+            on_hand, on_object = touching_parameters(contact, _inverse(T_frame) @ T_object, length_scale)
         for patch, frozen, values in (
             (contact.hand, contact.hand_frozen, on_hand),
             (contact.object, contact.frozen, on_object),

@@ -285,7 +285,7 @@ class Problem:
                 f"problem '{self.name}' has no first grasp x1: give one, or take one that is found, as in "
                 "problem.at(graspatlas.find_grasps(problem)[0])"
             )
-        return first_grasp_to_array(self.x1, self.hand, self.contacts, self.object_joint)
+        return first_grasp_to_array(self.x1, self.hand, self.contacts, self.object_joint, self.length_scale)
 
     def at(self, x: ArrayLike) -> Problem:
         """The same problem with another first grasp; the hand motions that are kept pass where they did.

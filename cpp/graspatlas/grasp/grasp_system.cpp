@@ -35,6 +35,14 @@ int object_embedding(const Model& model) {
 // Numbers of q that may be compared one by one: all but quaternions, whose negatives are the same.
 bool comparable(const JointInfo& joint) { return joint.q_size == joint.v_size || joint.q_size == 2; }
 
+// An angle is embedded as a point of the circle.
+int embedded_numbers(ParameterUnit unit) { return unit == ParameterUnit::angle ? 2 : 1; }
+
+// How much a patch's parameter changes when its tangent coordinate changes by one.
+double parameter_scale(ParameterUnit unit, double length_scale) {
+  return unit == ParameterUnit::length ? length_scale : 1.0;
+}
+
 template <class Visit>
 void visit_sides(const std::vector<Contact>& contacts, Visit visit) {
   for (const Contact& contact : contacts) {
@@ -59,8 +67,8 @@ int GraspSystem::embedding_size(const Model& model, const std::vector<Contact>& 
     for (const JointInfo& joint : model.hand_joints()) size += comparable(joint) ? joint.q_size : 0;
   }
   visit_sides(contacts, [&](const ContactSide& side) {
-    size += side.u.free ? 1 + side.patch->u_is_angle() : 0;
-    size += side.v.free;
+    if (side.u.free) size += embedded_numbers(side.patch->u_unit());
+    if (side.v.free) size += embedded_numbers(side.patch->v_unit());
   });
   return size;
 }
@@ -92,8 +100,8 @@ GraspSystem::GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> cont
     if (side.joint < 0 || side.joint >= joints)
       throw Error("a contact sits on joint " + std::to_string(side.joint) + ", the model has " +
                   std::to_string(joints));
-    if (side.u.free) parameters_.push_back({&side.u, side.patch->u_is_angle()});
-    if (side.v.free) parameters_.push_back({&side.v, false});
+    if (side.u.free) parameters_.push_back({&side.u, side.patch->u_unit()});
+    if (side.v.free) parameters_.push_back({&side.v, side.patch->v_unit()});
   });
   add_joint_bounds(lower, upper);
   add_parameter_bounds();
@@ -133,7 +141,7 @@ void GraspSystem::add_parameter_bounds() {
   for (std::size_t i = 0; i < parameters_.size(); ++i) {
     const PatchParameter& parameter = *parameters_[i].parameter;
     if (parameter.periodic) continue;
-    const double scale = parameters_[i].angle ? 1.0 : length_scale_;
+    const double scale = parameter_scale(parameters_[i].unit, length_scale_);
     const auto add = [&](double sign, double limit, const char* side) {
       if (!std::isfinite(limit)) return;
       bounds_.push_back({model_->q_size() + static_cast<int>(i), static_cast<int>(i), false, sign, limit, scale});
@@ -229,8 +237,7 @@ void GraspSystem::linearize(const double* x, double* R, double* J) {
     for (int v : model_->support(contact.hand.joint)) add_column(v, 1.0, hand.point, a_cross_m, b_cross_m, J);
     for (int v : model_->support(contact.object.joint)) add_column(v, -1.0, object.point, a_cross_m, b_cross_m, J);
 
-    // Free parameters: u and v of the hand's patch, then of the object's; lengths are in units of
-    // length_scale.
+    // Free parameters: u and v of the hand's patch, then of the object's; lengths are in units of length_scale.
     const auto fill = [&](double dx, double dy, double dz, double da, double db) {
       const double entries[kEntries] = {dx, dy, dz, da, db};
       for (int e = 0; e < rows_per_contact_; ++e) J[static_cast<std::ptrdiff_t>(e) * n + column] = entries[rows_[e]];
@@ -247,12 +254,12 @@ void GraspSystem::linearize(const double* x, double* R, double* J) {
       const Eigen::Vector3d dm = scale * (object.rotation * m_w);
       fill(d.x(), d.y(), d.z(), a.dot(dm), b.dot(dm));
     };
-    const double hand_u_scale = contact.hand.patch->u_is_angle() ? 1.0 : length_scale_;
-    const double object_u_scale = contact.object.patch->u_is_angle() ? 1.0 : length_scale_;
-    if (contact.hand.u.free) hand_column(hand.local.o_u, hand.local.m_u, hand.local.a_u, hand.local.b_u, hand_u_scale);
-    if (contact.hand.v.free) hand_column(hand.local.o_v, hand.local.m_v, hand.local.a_v, hand.local.b_v, length_scale_);
-    if (contact.object.u.free) object_column(object.local.o_u, object.local.m_u, object_u_scale);
-    if (contact.object.v.free) object_column(object.local.o_v, object.local.m_v, length_scale_);
+    const auto scale_of = [&](ParameterUnit unit) { return parameter_scale(unit, length_scale_); };
+    const PatchPoint &h = hand.local, &o = object.local;
+    if (contact.hand.u.free) hand_column(h.o_u, h.m_u, h.a_u, h.b_u, scale_of(contact.hand.patch->u_unit()));
+    if (contact.hand.v.free) hand_column(h.o_v, h.m_v, h.a_v, h.b_v, scale_of(contact.hand.patch->v_unit()));
+    if (contact.object.u.free) object_column(o.o_u, o.m_u, scale_of(contact.object.patch->u_unit()));
+    if (contact.object.v.free) object_column(o.o_v, o.m_v, scale_of(contact.object.patch->v_unit()));
     J += static_cast<std::ptrdiff_t>(rows_per_contact_) * n;
   }
 }
@@ -274,7 +281,7 @@ void GraspSystem::integrate(const double* x, const double* v, double* out) const
   const double* v_w = v + motion_count_ + object_v_size_;
   for (int i = 0; i < parameter_count(); ++i) {
     const int at = model_->q_size() + i;
-    out[at] = parameters_[i].angle ? x[at] + v_w[i] : x[at] + length_scale_ * v_w[i];
+    out[at] = x[at] + parameter_scale(parameters_[i].unit, length_scale_) * v_w[i];
     if (parameters_[i].parameter->periodic) out[at] = wrap_angle(out[at]);
   }
 }
@@ -296,7 +303,8 @@ void GraspSystem::difference(const double* x0, const double* x1, double* out) co
   for (int i = 0; i < parameter_count(); ++i) {
     const int at = model_->q_size() + i;
     const double d = x1[at] - x0[at];
-    out_w[i] = parameters_[i].parameter->periodic ? wrap_angle(d) : parameters_[i].angle ? d : d / length_scale_;
+    out_w[i] =
+        parameters_[i].parameter->periodic ? wrap_angle(d) : d / parameter_scale(parameters_[i].unit, length_scale_);
   }
 }
 
@@ -323,11 +331,11 @@ void GraspSystem::embed(const double* x, double* out) const {
   }
   for (int i = 0; i < parameter_count(); ++i) {
     const double value = x[model_->q_size() + i];
-    if (parameters_[i].angle) {
+    if (parameters_[i].unit == ParameterUnit::angle) {
       *out++ = std::cos(value);
       *out++ = std::sin(value);
     } else {
-      *out++ = value / length_scale_;
+      *out++ = value / parameter_scale(parameters_[i].unit, length_scale_);
     }
   }
 }

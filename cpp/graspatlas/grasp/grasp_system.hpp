@@ -86,7 +86,7 @@ class GraspSystem : public System {
   };
   struct FreeParameter {
     const PatchParameter* parameter;
-    bool angle;
+    ParameterUnit unit;
   };
   struct SideState {
     PatchPoint local;

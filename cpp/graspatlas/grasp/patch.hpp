@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "graspatlas/grasp/piecewise_cubic.hpp"
+
 namespace graspatlas {
 
 /// A rigid placement: maps coordinates of the inner frame to the outer one, p_outer = rotation p_inner +
@@ -20,14 +22,18 @@ struct PatchPoint {
   Eigen::Vector3d o_v, m_v, a_v, b_v;
 };
 
+/// What a patch's parameter measures: a length [m], an angle [rad], or a pure number, which counts as much as as many
+/// radians.
+enum class ParameterUnit { length, angle, number };
+
 /// A parametrised piece of surface in the frame of the body that carries it. The identities that must hold:
 /// a, b, m are orthonormal, o_u and o_v are normal to m.
 class Patch {
  public:
   virtual ~Patch() = default;
   virtual void evaluate(double u, double v, PatchPoint& out) const = 0;
-  /// True when u is an angle [rad] rather than a length [m]; v is always a length.
-  virtual bool u_is_angle() const = 0;
+  virtual ParameterUnit u_unit() const = 0;
+  virtual ParameterUnit v_unit() const = 0;
 };
 
 /// o(u, v) = u e_x + v e_z + 0 e_y in the placement, with normal e_y. A fixed point is a plane with u and v
@@ -36,7 +42,8 @@ class PlanePatch : public Patch {
  public:
   explicit PlanePatch(const Placement& placement);
   void evaluate(double u, double v, PatchPoint& out) const override;
-  bool u_is_angle() const override { return false; }
+  ParameterUnit u_unit() const override { return ParameterUnit::length; }
+  ParameterUnit v_unit() const override { return ParameterUnit::length; }
 
  private:
   Placement placement_;
@@ -45,21 +52,20 @@ class PlanePatch : public Patch {
 /// o(u, v) = (r(v) cos u, v, r(v) sin u) in the placement, with outward normal (cos u, -r', sin u) / sqrt(1 +
 /// r'^2).
 ///
-/// r is a piecewise cubic, r(v) = c0 + c1 s + c2 s^2 + c3 s^3 with s = v - break, so cylinders and cones are
-/// the cases of one constant or linear piece. It should have a continuous second derivative, for Newton's
-/// sake.
+/// r is a piecewise cubic, so cylinders and cones are the cases of one constant or linear piece. It should have a
+/// continuous second derivative, for Newton's sake.
 class RevolutionPatch : public Patch {
  public:
   /// `breaks` ascend, one more than there are rows of `coefficients` [pieces x 4].
   RevolutionPatch(const Placement& placement, std::vector<double> breaks,
                   const Eigen::Matrix<double, Eigen::Dynamic, 4>& coefficients);
   void evaluate(double u, double v, PatchPoint& out) const override;
-  bool u_is_angle() const override { return true; }
+  ParameterUnit u_unit() const override { return ParameterUnit::angle; }
+  ParameterUnit v_unit() const override { return ParameterUnit::length; }
 
  private:
   Placement placement_;
-  std::vector<double> breaks_;
-  Eigen::Matrix<double, Eigen::Dynamic, 4> coefficients_;
+  PiecewiseCubic outline_;
 };
 
 }  // namespace graspatlas

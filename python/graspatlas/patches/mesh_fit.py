@@ -1,0 +1,259 @@
+"""A B-spline patch fitted to a region of a triangle mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import BSpline as SplineBasis
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from graspatlas.errors import GraspAtlasError
+from graspatlas.patches.base import Array, Vector3, checked_length, checked_vector, placement
+from graspatlas.patches.spline import BSpline, clamped_knots
+
+__all__ = ["FitReport", "patch_from_mesh"]
+
+Indices = NDArray[np.int64]
+
+#: Degree of the fitted spline.
+DEGREE = 3
+#: Points along each side of the grid at which heights are read off the mesh.
+SAMPLES = 65
+#: Weight of the penalty on bends of the control net, beside that of the heights.
+SMOOTHING = 1e-4
+#: Normals of the region may turn by this much from that of the centre [rad]: 80 degrees.
+LARGEST_TURN = np.radians(80.0)
+#: The tangent plane is the mean of the faces within this share of the size, the more the nearer they are.
+TANGENT_SHARE = 0.25
+#: Two layers of the region over one point are one when they are no farther apart than this share of the size.
+SAME_HEIGHT = 1e-3
+#: How far outside a triangle a point still lies on it, in barycentric coordinates.
+ON_EDGE = 1e-9
+
+
+@dataclass(frozen=True)
+class FitReport:
+    """How well a patch fits the region of the mesh.
+
+    Distances are measured along the normal of the tangent plane, so they are not below the true ones.
+
+    Attributes:
+        largest, rms: Largest and root-mean-square distance of the mesh from the patch [m].
+        turn: Largest angle between the normals of the region and that of its centre [rad].
+        faces: Number of triangles of the region.
+    """
+
+    largest: float
+    rms: float
+    turn: float
+    faces: int
+
+    def __str__(self) -> str:
+        return (
+            f"{self.faces} triangles, normals turn by {np.degrees(self.turn):.0f} degrees; distance "
+            f"{1e3 * self.largest:.3g} mm at most, {1e3 * self.rms:.3g} mm rms"
+        )
+
+
+def patch_from_mesh(
+    mesh: Any,
+    center: ArrayLike,
+    size: float,
+    *,
+    u_axis: ArrayLike = (1.0, 0.0, 0.0),
+    control_points: int = 12,
+    tolerance: float = 0.02,
+) -> tuple[BSpline, FitReport]:
+    """Fit a B-spline patch to a triangle mesh around a point.
+
+    The patch is the graph of a cubic spline over the tangent plane at the mesh's point nearest to the centre: u and v
+    are the distances from that point along the plane [m], both from -size to size. The spline fits the heights of the
+    mesh's faces over an even grid by least squares, with a small penalty on bends.
+
+    Args:
+        mesh: A file that trimesh reads (STL, OBJ, PLY, OFF, ...), or a ``trimesh.Trimesh``; in metres, with faces that
+            turn counter-clockwise seen from outside.
+        center: Where, in the mesh's frame [3], within ``size`` of the mesh.
+        size: How far the patch reaches along u and v [m].
+        u_axis: Direction of u, made parallel to the tangent plane.
+        control_points: Number of control points along u and along v, at least 4.
+        tolerance: Largest distance of the mesh from the patch, as a share of the size.
+
+    Returns:
+        The patch, with its outward normal that of the faces, and how well it fits.
+
+    Raises:
+        GraspAtlasError: If trimesh is not installed, an argument makes no sense, or the region is no graph over its
+            tangent plane: it has a hole or an edge, is not a manifold, or turns by more than 80 degrees; or the patch
+            misses the mesh by more than the tolerance.
+    """
+    half = checked_length(size, "size")
+    checked_length(tolerance, "tolerance")
+    if isinstance(control_points, bool) or not isinstance(control_points, int) or not 4 <= control_points <= SAMPLES:
+        raise GraspAtlasError(f"control_points must be a whole number from 4 to {SAMPLES}, got {control_points!r}")
+    at, u_hint = checked_vector(center, "center"), checked_vector(u_axis, "u_axis", unit=True)
+    corners, faces = _loaded(mesh)
+    nearest, origin, axes = _tangent_frame(corners[faces], np.array(at), half, u_hint)
+    corners = (corners - origin) @ axes
+    region = _region(corners, faces, nearest, half)
+    turn = float(np.arccos(np.clip(_normals(corners[region])[:, 2], -1.0, 1.0)).max())
+    if turn > LARGEST_TURN:
+        raise GraspAtlasError(
+            f"the mesh turns by {np.degrees(turn):.0f} degrees within size {half:g} m of the centre, at most "
+            f"{np.degrees(LARGEST_TURN):.0f} are allowed: choose a smaller size"
+        )
+    ticks = np.linspace(-half, half, SAMPLES)
+    heights = _heights(corners[region], ticks, half)
+    knots = clamped_knots(control_points, DEGREE, -half, half)
+    net = _fitted(heights, ticks, knots)
+    u, v = np.meshgrid(ticks, ticks, indexing="ij")
+    seen = corners[np.unique(region)]
+    seen = seen[np.abs(seen[:, :2]).max(axis=1) <= half]
+    gaps = np.abs(_gaps(net, knots, np.concatenate([np.column_stack([u.ravel(), v.ravel(), heights.ravel()]), seen])))
+    report = FitReport(float(gaps.max()), float(np.sqrt(np.mean(gaps**2))), turn, len(region))
+    if report.largest > tolerance * half:
+        raise GraspAtlasError(
+            f"the patch misses the mesh by {1e3 * report.largest:.3g} mm, more than {100 * tolerance:g} % of size "
+            f"{half:g} m: choose a smaller size, more control_points or a larger tolerance"
+        )
+    # A spline whose control points lie over the means of its knots (Greville's abscissae) is the graph of its heights.
+    means = np.lib.stride_tricks.sliding_window_view(knots[1:-1], DEGREE).mean(axis=1)
+    u, v = np.meshgrid(means, means, indexing="ij")
+    points = np.stack([u, v, net], axis=-1) @ axes.T + origin
+    row = tuple(map(float, knots))
+    return BSpline(control_points=points, u_knots=row, v_knots=row, unit="m"), report
+
+
+def _loaded(mesh: Any) -> tuple[Array, Indices]:
+    """Vertices [v, 3] and faces [n, 3] of a mesh, with equal vertices made one."""
+    try:
+        import trimesh
+    except ImportError:
+        raise GraspAtlasError("fitting to a mesh needs trimesh; install it: pip install graspatlas[mesh]") from None
+    if isinstance(mesh, str | Path):
+        path = Path(mesh)
+        if not path.is_file():
+            raise GraspAtlasError(f"there is no mesh file '{path}'; correct the path")
+        try:
+            mesh = trimesh.load_mesh(path)
+        except Exception as error:  # whatever the reader of that format raises
+            raise GraspAtlasError(f"cannot read mesh file '{path}': {error}") from None
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise GraspAtlasError(f"mesh must be a file with one mesh or a trimesh.Trimesh, got {type(mesh).__name__}")
+    corners, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, int)
+    if len(faces) == 0 or not np.isfinite(corners).all():
+        raise GraspAtlasError("the mesh has no faces, or vertices that are not finite")
+    corners, which = np.unique(corners, axis=0, return_inverse=True)
+    faces = which.reshape(-1)[faces]
+    areas = np.linalg.norm(np.cross(*_edges(corners[faces])), axis=1)
+    return corners, faces[areas > 0.0]
+
+
+def _edges(triangles: Array) -> tuple[Array, Array]:
+    """The two edges from the first corner of triangles [n, 3, 3]."""
+    return triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+
+
+def _normals(triangles: Array) -> Array:
+    """Unit normals of triangles [n, 3]."""
+    across = np.cross(*_edges(triangles))
+    return np.asarray(across / np.linalg.norm(across, axis=1, keepdims=True))
+
+
+def _tangent_frame(triangles: Array, center: Array, half: float, u_hint: Vector3) -> tuple[int, Array, Array]:
+    """The face nearest to the centre, its nearest point [3], and the axes of u, v and the normal there [3, 3]."""
+    import trimesh
+
+    nearest_points = trimesh.triangles.closest_point(triangles, np.tile(center, (len(triangles), 1)))
+    distances = np.linalg.norm(nearest_points - center, axis=1)
+    nearest = int(np.argmin(distances))
+    if distances[nearest] > half:
+        raise GraspAtlasError(
+            f"the mesh is {distances[nearest]:.3g} m away from the centre, farther than size {half:g} m: correct "
+            "center (metres, in the mesh's frame)"
+        )
+    origin = nearest_points[nearest]
+    normals = _normals(triangles)
+    nearness = 1.0 - (np.linalg.norm(nearest_points - origin, axis=1) / (TANGENT_SHARE * half)) ** 2
+    near = (nearness > 0.0) & (normals @ normals[nearest] > np.cos(LARGEST_TURN))
+    areas = np.linalg.norm(np.cross(*_edges(triangles[near])), axis=1)
+    normal = (areas * nearness[near]) @ normals[near]
+    T = placement((0.0, 0.0, 0.0), tuple(normal / np.linalg.norm(normal)), u_hint)
+    return nearest, origin, np.column_stack([T[:3, 0], -T[:3, 2], T[:3, 1]])
+
+
+def _region(corners: Array, faces: Indices, nearest: int, half: float) -> Indices:
+    """Faces [m, 3] over the square of the patch that hang together with the nearest one, checked to be a manifold."""
+    over = np.flatnonzero(_overlapping(corners[faces][:, :, :2], half))
+    directed = faces[over][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    edges = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True)[1].reshape(-1)
+    owners = np.repeat(np.arange(len(over)), 3)
+    incidence = coo_array((np.ones(len(edges)), (owners, edges))).tocsr()
+    groups = connected_components(incidence @ incidence.T, directed=False)[1]
+    mine = groups == groups[np.searchsorted(over, nearest)]
+    directed = directed[np.repeat(mine, 3)]
+    if len(np.unique(directed, axis=0)) < len(directed):
+        raise GraspAtlasError(
+            "the mesh is no manifold within size of the centre: an edge has three faces, or neighbouring faces turn "
+            "different ways; repair the mesh"
+        )
+    return np.asarray(faces[over[mine]])
+
+
+def _overlapping(triangles: Array, half: float) -> NDArray[np.bool_]:
+    """Which triangles of the plane [n, 3, 2] overlap the square: those that no side of either separates from it."""
+    apart = (triangles.min(axis=1) > half).any(axis=1) | (triangles.max(axis=1) < -half).any(axis=1)
+    for i in range(3):
+        side = triangles[:, (i + 1) % 3] - triangles[:, i]
+        across = np.column_stack([-side[:, 1], side[:, 0]])
+        along = np.einsum("nkd,nd->nk", triangles, across)
+        reach = half * np.abs(across).sum(axis=1)
+        apart |= (along.min(axis=1) > reach) | (along.max(axis=1) < -reach)
+    return np.asarray(~apart)
+
+
+def _heights(triangles: Array, ticks: Array, half: float) -> Array:
+    """Heights of the triangles over a grid of points of the tangent plane [SAMPLES, SAMPLES]."""
+    heights = np.full((len(ticks), len(ticks)), np.nan)
+    low = np.searchsorted(ticks, triangles[:, :, :2].min(axis=1) - ON_EDGE * half)
+    high = np.searchsorted(ticks, triangles[:, :, :2].max(axis=1) + ON_EDGE * half)
+    for triangle, (i0, j0), (i1, j1) in zip(triangles, low, high, strict=True):
+        if i0 == i1 or j0 == j1:
+            continue
+        u, v = np.meshgrid(ticks[i0:i1], ticks[j0:j1], indexing="ij")
+        (a, b), h = (triangle[1:, :2] - triangle[0, :2]), triangle[:, 2]
+        area = a[0] * b[1] - a[1] * b[0]
+        du, dv = u - triangle[0, 0], v - triangle[0, 1]
+        s, t = (du * b[1] - dv * b[0]) / area, (dv * a[0] - du * a[1]) / area
+        inside = (s >= -ON_EDGE) & (t >= -ON_EDGE) & (s + t <= 1.0 + ON_EDGE)
+        found = h[0] + s * (h[1] - h[0]) + t * (h[2] - h[0])
+        part = heights[i0:i1, j0:j1]
+        if (np.abs(part - found)[inside] > SAME_HEIGHT * half).any():
+            raise GraspAtlasError("the mesh lies over itself within size of the centre: choose a smaller size")
+        part[inside] = found[inside]
+    if np.isnan(heights).any():
+        share = 100.0 * np.isnan(heights).mean()
+        raise GraspAtlasError(
+            f"the mesh has an edge or a hole within size {half:g} m of the centre ({share:.2g} % of the patch is "
+            "empty): choose a smaller size or another center"
+        )
+    return heights
+
+
+def _fitted(heights: Array, ticks: Array, knots: Array) -> Array:
+    """Heights of the control net [n, n]: least squares along u and along v, with a penalty on second differences."""
+    A = SplineBasis.design_matrix(ticks, knots, DEGREE).toarray()
+    D = np.diff(np.eye(A.shape[1]), 2, axis=0)
+    S = np.linalg.solve(A.T @ A + SMOOTHING * D.T @ D, A.T)
+    return np.asarray(S @ heights @ S.T)
+
+
+def _gaps(net: Array, knots: Array, points: Array) -> Array:
+    """Heights of points (u, v, height) [n, 3] over the spline [n]."""
+    u, v = (SplineBasis.design_matrix(points[:, i], knots, DEGREE).toarray() for i in range(2))
+    return np.asarray(points[:, 2] - np.einsum("ni,ij,nj->n", u, net, v))
