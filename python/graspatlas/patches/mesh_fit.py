@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -129,12 +130,17 @@ def patch_from_mesh(
     return BSpline(control_points=points, u_knots=row, v_knots=row, unit="m"), report
 
 
-def _loaded(mesh: Any) -> tuple[Array, Indices]:
-    """Vertices [v, 3] and faces [n, 3] of a mesh, with equal vertices made one."""
+def _trimesh() -> Any:
+    """The optional package trimesh."""
     try:
-        import trimesh
+        return importlib.import_module("trimesh")
     except ImportError:
         raise GraspAtlasError("fitting to a mesh needs trimesh; install it: pip install graspatlas[mesh]") from None
+
+
+def _loaded(mesh: Any) -> tuple[Array, Indices]:
+    """Vertices [v, 3] and faces [n, 3] of a mesh, with equal vertices made one."""
+    trimesh = _trimesh()
     if isinstance(mesh, str | Path):
         path = Path(mesh)
         if not path.is_file():
@@ -167,9 +173,7 @@ def _normals(triangles: Array) -> Array:
 
 def _tangent_frame(triangles: Array, center: Array, half: float, u_hint: Vector3) -> tuple[int, Array, Array]:
     """The face nearest to the centre, its nearest point [3], and the axes of u, v and the normal there [3, 3]."""
-    import trimesh
-
-    nearest_points = trimesh.triangles.closest_point(triangles, np.tile(center, (len(triangles), 1)))
+    nearest_points = _trimesh().triangles.closest_point(triangles, np.tile(center, (len(triangles), 1)))
     distances = np.linalg.norm(nearest_points - center, axis=1)
     nearest = int(np.argmin(distances))
     if distances[nearest] > half:

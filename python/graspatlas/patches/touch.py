@@ -23,6 +23,8 @@ GRID = 3
 STARTS = 4
 #: Relative change at which a search ends.
 TOLERANCE = 1e-14
+#: Residual at which a start touches already: where two planes touch everywhere, it is as good as any other point.
+TOUCHING = 1e-9
 
 
 def touching_parameters(contact: Contact, T_hand_object: Array, length_scale: float) -> tuple[Pair, Pair]:
@@ -64,11 +66,14 @@ def touching_parameters(contact: Contact, T_hand_object: Array, length_scale: fl
         both = np.where(free, np.array([point, contact.object.locate(at)]), values)[free]
         starts.append(np.clip(both, *limits))
     starts.sort(key=lambda w: float(np.linalg.norm(residual(w))))
-    found = [
-        least_squares(residual, w, jacobian, limits, x_scale="jac", xtol=TOLERANCE, ftol=TOLERANCE, gtol=TOLERANCE)
-        for w in starts[:STARTS]
-    ]
-    (u, v), (body_u, body_v) = filled(min(found, key=lambda result: float(result.cost)).x)
+    best = starts[0]
+    if np.linalg.norm(residual(best)) > TOUCHING:
+        found = [
+            least_squares(residual, w, jacobian, limits, x_scale="jac", xtol=TOLERANCE, ftol=TOLERANCE, gtol=TOLERANCE)
+            for w in starts[:STARTS]
+        ]
+        best = min(found, key=lambda result: float(result.cost)).x
+    (u, v), (body_u, body_v) = filled(best)
     return (float(u), float(v)), (float(body_u), float(body_v))
 
 
