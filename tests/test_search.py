@@ -201,6 +201,11 @@ def test_misuse(options, words):
         ga.find_grasps(without_x1("schunk_can"), **options)
 
 
+def test_a_problem_is_needed():
+    with pytest.raises(ga.GraspAtlasError, match="load_problem"):
+        ga.find_grasps("schunk_can")
+
+
 # Problems without x1 ------------------------------------------------------------------------------
 
 

@@ -61,23 +61,27 @@ def find_grasps(
     """
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
         raise GraspAtlasError(f"count must be a whole number of at least 1, got {count!r}")
+    if not isinstance(problem, Problem):
+        raise GraspAtlasError(f"problem must be a graspatlas.Problem, got {type(problem).__name__}; see load_problem")
     search = GraspSearch(problem, problem.full_dimension if dimension is None else dimension, seed)
-    deadline = deadline_after(max_seconds)
+    deadline, last_new = deadline_after(max_seconds), 0
     found: list[Array] = []
     places: list[Array] = []
     with search_bar("tries", progress) as bar:
         try:
             while len(found) < count:
                 x = search.next_grasp(deadline, bar)
-                if x is None:
+                if x is None or search.tries - last_new > MAX_TRIES:
                     break
                 place = search.system.embed(x)
                 if not places or np.linalg.norm(np.array(places) - place, axis=1).min() > SAME:
                     found.append(x)
                     places.append(place)
+                    last_new = search.tries
                     bar.set_postfix(grasps=len(found), refresh=False)
         except KeyboardInterrupt:
-            bar.write(f"interrupted: keeping {len(found)} grasps", file=sys.stderr)
+            if not bar.disable:
+                bar.write(f"interrupted: keeping {len(found)} grasps", file=sys.stderr)
     return np.array(found).reshape(len(found), search.system.configuration_size)
 
 
