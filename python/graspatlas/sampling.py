@@ -129,7 +129,7 @@ def densify(result: Result, spacing: float, *, share: float = 1.0, progress: boo
     Args:
         result: The result; its index and its requirements are those of the samples.
         spacing: Distance between lattice points in a tangent space [rad, and lengths in units of
-            ``problem.length_scale``]; at a fourth of the radius there are some twenty samples a chart when k = 2.
+            ``problem.length_scale``]; at a fourth of the radius there are some thirty samples a chart when k = 2.
         share: Share of the charts to fill, those with the largest jumps; above 0, and 1 for all.
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
