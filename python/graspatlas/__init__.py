@@ -14,6 +14,7 @@ from graspatlas.hand import Body, Hand
 from graspatlas.local_search import Climb, Peak, climb, local_maxima, peaks_of
 from graspatlas.motions import HandMotions
 from graspatlas.optimizer import build_atlas, optimize
+from graspatlas.pareto import pareto_front
 from graspatlas.problem import Problem
 from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.projection import project
@@ -21,6 +22,7 @@ from graspatlas.quality import batched
 from graspatlas.refinement import Refinement, refine
 from graspatlas.requirements import CollisionFree, ForceClosure, JointMargin
 from graspatlas.result import Result, load_result
+from graspatlas.sampling import Samples, densify
 from graspatlas.search import find_grasps
 from graspatlas.systems import System
 from graspatlas.viewer import export_html, save_picture, view
@@ -33,6 +35,7 @@ if typing.TYPE_CHECKING:
         plot_ellipsoid,
         plot_growth,
         plot_local_maxima,
+        plot_pareto,
         plot_planar_grasp,
         plot_planar_indices,
     )
@@ -59,6 +62,7 @@ __all__ = [
     "Problem",
     "Refinement",
     "Result",
+    "Samples",
     "SearchStatus",
     "Status",
     "System",
@@ -66,6 +70,7 @@ __all__ = [
     "build_atlas",
     "bundled_problems",
     "climb",
+    "densify",
     "export_html",
     "find_components",
     "find_grasps",
@@ -74,6 +79,7 @@ __all__ = [
     "local_maxima",
     "motions",
     "optimize",
+    "pareto_front",
     "patches",
     "peaks_of",
     "plot_atlas",
@@ -82,6 +88,7 @@ __all__ = [
     "plot_ellipsoid",
     "plot_growth",
     "plot_local_maxima",
+    "plot_pareto",
     "plot_planar_grasp",
     "plot_planar_indices",
     "project",

@@ -1,4 +1,4 @@
-"""Command line: graspatlas list, optimize, view, check-result, sweep, reproduce."""
+"""Command line: graspatlas list, optimize, view, pareto, densify, check-result, reproduce."""
 
 from __future__ import annotations
 
@@ -19,10 +19,13 @@ from graspatlas.atlas import Status
 from graspatlas.components import Components, SearchStatus, find_components
 from graspatlas.errors import GraspAtlasError
 from graspatlas.optimizer import optimize
+from graspatlas.pareto import knee, pareto_front, values_of
 from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.quality import INDICES, quality_name
 from graspatlas.requirements import REQUIREMENTS, parse_requirement
 from graspatlas.result import Result, load_result, writable_folder
+from graspatlas.sampling import Samples, densify
+from graspatlas.viewer.files import replaced
 
 __all__ = ["main"]
 
@@ -130,6 +133,23 @@ def _parser() -> argparse.ArgumentParser:
     look.add_argument("--picture", type=Path, metavar="FILE", help="write a PNG picture instead")
     look.add_argument("--no-browser", action="store_true", help="do not open a browser, only say where to look")
     look.set_defaults(run=_view)
+
+    front = commands.add_parser("pareto", help="list the grasps that no other beats in two indices")
+    front.add_argument("result", type=Path, help="folder or file that optimize wrote")
+    front.add_argument("first", metavar="FIRST", help="quality index, the best by which comes first")
+    front.add_argument("second", metavar="SECOND", help="another quality index")
+    front.add_argument("--picture", type=Path, metavar="FILE", help="write a figure (.png, .pdf or .svg)")
+    front.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    front.set_defaults(run=_pareto)
+
+    denser = commands.add_parser("densify", help="read the index between the charts' centres, and write samples.npz")
+    denser.add_argument("result", type=Path, help="folder or file that optimize wrote; samples.npz is written beside")
+    denser.add_argument("spacing", type=float, metavar="SPACING", help="distance of samples, in the unit of the radius")
+    denser.add_argument(
+        "--share", type=float, default=1.0, metavar="F", help="only the charts where the index jumps most"
+    )
+    denser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    denser.set_defaults(run=_densify)
 
     verify = commands.add_parser("check-result", help="verify a result again, from the problem that it carries")
     verify.add_argument("result", type=Path, help="folder or file that optimize wrote")
@@ -311,6 +331,75 @@ def _view(options: argparse.Namespace) -> int:
     if not options.html and not options.picture:
         view(result, open_browser=not options.no_browser)
     return 0
+
+
+def _pareto(options: argparse.Namespace) -> int:
+    kinds = (".png", ".pdf", ".svg")
+    if options.picture and options.picture.suffix not in kinds:
+        raise GraspAtlasError(f"picture '{options.picture}' must end in one of {', '.join(kinds)}")
+    result = load_result(options.result)
+    names = (options.first, options.second)
+    front = pareto_front(result, *names)
+    values = values_of(result, *names)[front]
+    at = knee(values)
+    if options.picture:
+        from graspatlas.viewer.figures import plot_pareto  # slow to import
+
+        with replaced(options.picture) as stream:
+            plot_pareto(result, *names).savefig(stream, format=options.picture.suffix[1:])
+        print(f"wrote {options.picture}", file=sys.stderr)
+    if options.json:
+        rows = [{"chart": int(c), "values": v.tolist()} for c, v in zip(front, values, strict=True)]
+        print(json.dumps({"indices": names, "front": rows, "knee": None if at is None else int(front[at])}))
+        return 0
+    print(f"{result.problem.name}: {len(front)} of {int(result.feasible.sum())} grasps are on the Pareto front")
+    print(f"  {'chart':>8} {names[0]:>26} {names[1]:>26}")
+    for row, (chart, pair) in enumerate(zip(front, values, strict=True)):
+        print(f"  {chart:8} {pair[0]:26.6g} {pair[1]:26.6g}{'  knee' if row == at else ''}")
+    return 0
+
+
+def _densify(options: argparse.Namespace) -> int:
+    result = load_result(options.result)
+    folder = writable_folder(options.result if options.result.is_dir() else options.result.parent)
+    samples = densify(result, options.spacing, share=options.share, progress=True)
+    with replaced(folder / "samples.npz") as stream:
+        np.savez_compressed(stream, **samples.to_arrays())
+    best = samples.best if samples.feasible.any() else None
+    if options.json:
+        summary = {
+            "n_samples": len(samples),
+            "n_feasible": int(samples.feasible.sum()),
+            "not_converged": samples.not_converged,
+            "outside": samples.outside,
+            "complete": samples.complete,
+            "best": best and {"quality": best.quality, "chart": best.chart, "x": best.x.tolist()},
+            "best_chart": result.best.quality if result.feasible.any() else None,
+        }
+        print(json.dumps(summary))
+    else:
+        print("\n".join(_sample_lines(result, samples, folder)))
+    if not samples.complete:
+        return INTERRUPTED
+    return 0 if best else FAILED
+
+
+def _sample_lines(result: Result, samples: Samples, folder: Path) -> list[str]:
+    lines = [
+        f"{result.problem.name}: {len(samples)} samples in {len(np.unique(samples.charts))} charts"
+        + ("" if samples.complete else "; interrupted"),
+        f"  {samples.outside} were outside the bounds, {samples.not_converged} did not reach the manifold",
+    ]
+    if result.requirements:
+        lines.append(f"  {samples.feasible.sum()} meet the requirements")
+    if samples.feasible.any():
+        best = samples.best
+        lines.append(f"  {quality_name(result.quality)}: best sample {best.quality:.9g} (chart {best.chart})")
+    else:
+        lines.append("  no best sample: relax a requirement, or fill a larger share")
+    if result.feasible.any():
+        lines.append(f"  best centre of a chart {result.best.quality:.9g}")
+    return [*lines, f"  written to {folder / 'samples.npz'}"]
 
 
 def _check_result(options: argparse.Namespace) -> int:

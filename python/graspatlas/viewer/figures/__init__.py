@@ -8,6 +8,7 @@ from graspatlas.viewer.figures.ellipse import plot_ellipsoid
 from graspatlas.viewer.figures.extremes import plot_best_and_worst
 from graspatlas.viewer.figures.indices import plot_planar_indices
 from graspatlas.viewer.figures.maxima import plot_climbs, plot_local_maxima
+from graspatlas.viewer.figures.pareto import plot_pareto
 from graspatlas.viewer.figures.planar import plot_planar_grasp
 from graspatlas.viewer.figures.polygons import Coordinates, object_pose, principal
 
@@ -20,6 +21,7 @@ __all__ = [
     "plot_ellipsoid",
     "plot_growth",
     "plot_local_maxima",
+    "plot_pareto",
     "plot_planar_grasp",
     "plot_planar_indices",
     "principal",
