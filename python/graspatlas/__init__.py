@@ -12,6 +12,7 @@ from graspatlas.hand import Body, Hand
 from graspatlas.local_search import Climb, Peak, climb, local_maxima, peaks_of
 from graspatlas.motions import HandMotions
 from graspatlas.optimizer import build_atlas, optimize
+from graspatlas.paths import GraspPath, Path, shortest_path
 from graspatlas.problem import Problem
 from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.quality import batched
@@ -45,10 +46,12 @@ __all__ = [
     "ForceClosure",
     "Grasp",
     "GraspAtlasError",
+    "GraspPath",
     "Grasps",
     "Hand",
     "HandMotions",
     "JointMargin",
+    "Path",
     "Peak",
     "Problem",
     "Result",
@@ -76,6 +79,7 @@ __all__ = [
     "plot_planar_indices",
     "quality",
     "save_picture",
+    "shortest_path",
     "systems",
     "view",
 ]

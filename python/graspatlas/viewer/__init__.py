@@ -50,7 +50,7 @@ def export_html(result: Result, path: str | os.PathLike[str]) -> None:
     Raises:
         GraspAtlasError: If a mesh cannot be read or the file cannot be written.
     """
-    from graspatlas.viewer.files import replaced
+    from graspatlas.files import replaced
     from graspatlas.viewer.page import page
     from graspatlas.viewer.scene import Scene
 
@@ -70,7 +70,7 @@ def save_picture(result: Result, path: str | os.PathLike[str], *, width: int = 1
     Raises:
         GraspAtlasError: If the size is too small, a mesh cannot be read or the file cannot be written.
     """
-    from graspatlas.viewer.files import replaced
+    from graspatlas.files import replaced
     from graspatlas.viewer.picture import check_size, draw
     from graspatlas.viewer.scene import Scene
 
