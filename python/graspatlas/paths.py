@@ -155,6 +155,11 @@ class GraspPath(Path):
         """False when the index was a callable that was lost when the result was stored."""
         return callable(self.result.quality) or self.result.quality in INDICES
 
+    @property
+    def knows_requirements(self) -> bool:
+        """False when a requirement was a callable that was lost when the result was stored."""
+        return not any(isinstance(requirement, str) for requirement in self.result.requirements)
+
     def save_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the path as a joint trajectory, one row a point.
 

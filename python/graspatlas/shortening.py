@@ -342,11 +342,11 @@ class _Band:
     def _ties(self) -> Array:
         """Blocks of the Hessian between neighbouring points [n - 1, k, k]."""
         Phi = self.model[0]
-        return -Phi[1:] @ Phi[:-1].transpose(0, 2, 1)
+        return np.asarray(-Phi[1:] @ Phi[:-1].transpose(0, 2, 1))
 
     def moved(self, u: Array) -> Array | None:
         """The points of the manifold above u [n, k], inside their bounds; None when one cannot be projected."""
-        X: Array = np.array(self.X)
+        X: Array = self.X.copy()
         for i in np.flatnonzero(np.any(u != 0.0, axis=1)):
             x = _above(self.system, self.X[i], self.model[0][i], u[i])
             if x is None:
