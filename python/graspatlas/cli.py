@@ -236,7 +236,7 @@ def _path(options: argparse.Namespace) -> int:
     start, end = (_chart(result, name) for name in (options.start, options.end))
     path = shortest_path(result, start, end, feasible=options.feasible, progress=True)
     print(
-        f"{result.problem.name}: path of length {path.length:.6g} from chart {start} to chart {end}, {len(path)} grasps"
+        f"{result.problem.name}: path of length {path.length:.6g} from chart {start} to chart {end}, {len(path)} points"
     )
     if not path.tight:
         print("  cut short: a shorter one may exist nearby")
@@ -245,7 +245,7 @@ def _path(options: argparse.Namespace) -> int:
         lowest = int(path.qualities.argmin())
         print(f"  {quality_name(result.quality)}: smallest {path.qualities[lowest]:.6g}, at point {lowest}")
     if result.requirements and path.knows_requirements:
-        print(f"  {path.feasible.sum()} of {len(path)} grasps meet the requirements")
+        print(f"  {path.feasible.sum()} of {len(path)} points meet the requirements")
     from graspatlas.viewer import export_html, save_picture
 
     writers = ((options.csv, GraspPath.save_csv), (options.html, export_html), (options.picture, save_picture))

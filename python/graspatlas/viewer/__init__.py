@@ -59,8 +59,8 @@ def export_html(shown: Result | Path, path: str | os.PathLike[str]) -> None:
     from graspatlas.viewer.scene import Scene
 
     shown = _checked(shown)
-    text = film_page(Film(shown)) if isinstance(shown, Path) else page(Scene(shown))
     with replaced(path) as stream:
+        text = film_page(Film(shown)) if isinstance(shown, Path) else page(Scene(shown))
         stream.write(text.encode("utf-8"))
 
 
@@ -88,11 +88,11 @@ def save_picture(shown: Result | Path, path: str | os.PathLike[str], *, width: i
         raise GraspAtlasError(f"a picture's name must end in .png, not '{os.fspath(path)}'")
     check_size(width, height)
     shown = _checked(shown)
-    if isinstance(shown, Path):
-        image = draw_strip(Film(shown, FRAMES), width, height)
-    else:
-        image = draw(Scene(shown), width, height)
     with replaced(path) as stream:
+        if isinstance(shown, Path):
+            image = draw_strip(Film(shown, FRAMES), width, height)
+        else:
+            image = draw(Scene(shown), width, height)
         image.save(stream, "PNG")
 
 
