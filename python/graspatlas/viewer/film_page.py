@@ -102,6 +102,7 @@ def film_caption(film: Film) -> Command:
     """What the path is, below it; for a view that has no foot."""
     camera = film.camera(ASPECT, WINDOW)
     name, rest = film_title(film.path).split(": ", 1)
+    rest += "; the controls, top right, play it"
     image = text_image([(name, LETTERS, DARK), (rest, 0.6 * LETTERS, GREY)])
     visible = 2.0 * camera.distance * np.tan(camera.field_of_view / 2.0)
     height = CAPTION_HEIGHT * visible
