@@ -36,11 +36,11 @@ Allowed = Callable[[Array], Flags]
 ZERO = 1e-11
 #: Iterations after which Newton's method is given up.
 MAX_ITERATIONS = 12
-#: Even steps may come out this much longer, for want of an even speed along a chain.
+#: Even steps are planned this much shorter than the longest, for want of an even speed along a chain.
 UNEVEN = 1e-3
 #: How far a point may be outside its bounds [units of the tangent space].
 BOUND_TOLERANCE = 1e-9
-#: Halves of a step may be this much longer than half of it; a step that does not shrink leads to another sheet.
+#: Largest share of a step that one of its halves may have; a step that does not shrink leads to another sheet.
 HALF = 0.75
 #: Halvings after which a gap counts as one that cannot be bridged.
 MAX_HALVINGS = 24
@@ -48,7 +48,7 @@ MAX_HALVINGS = 24
 DIFFERENCE = 1e-2
 #: Steps of Gauss-Newton after which the chain is left as it is, and the relative gain that ends them before.
 MAX_STEPS = 60
-LEAST_GAIN = 1e-7
+LEAST_GAIN = 2e-6
 #: Gain that ends them where a black box limits the chain: what follows is slow and small.
 LEAST_GAIN_LIMITED = 1e-5
 #: Shares of a move that are tried, and rounds in which walls are found on the way.
@@ -58,6 +58,8 @@ ROUNDS = 3
 #: way the wall runs.
 WALL_HALVINGS = 6
 PROBE = 0.25
+#: What is asked round a place says nothing of a wall when the sum of the directions is shorter than this.
+NO_SIDE = 1e-9
 #: Steps of the interior-point method, share of the complementarity that each aims at, and what may be left of it.
 MAX_INTERIOR_STEPS = 60
 CENTRING = 0.1
@@ -390,7 +392,7 @@ class _Walls:
         side = np.where(allowed(np.array(asked)), -1.0, 1.0).reshape(len(points), len(ring)) @ ring
         size = np.linalg.norm(side, axis=1, keepdims=True)
         ahead = u[points] / np.linalg.norm(u[points], axis=1, keepdims=True)
-        self.normals[points] = np.where(size > 1e-9, side / np.maximum(size, 1e-9), ahead)
+        self.normals[points] = np.where(size > NO_SIDE, side / np.maximum(size, NO_SIDE), ahead)
         self.offsets[points] = np.maximum(np.sum(self.normals[points] * places, axis=1), 0.0)
 
 
