@@ -355,3 +355,21 @@ def test_wrong_words_give_one_line(capsys):
 def test_part_of_a_name_finds_it(capsys):
     assert main(["optimize", "schunk_can", "--quality", "volum"]) == 2
     assert "did you mean 'manipulability_volume'" in capsys.readouterr().err
+
+
+def test_path(cli, tmp_path):
+    assert cli(*QUICK, "--require", "joint_margin:0.01", "--output", tmp_path)[0] == 0
+    status, out, err = cli("path", tmp_path, "--from", "worst", "--feasible", "--csv", tmp_path / "path.csv")
+    assert status == 0
+    assert "path of length" in out
+    assert "largest residual" in out
+    assert "points meet the requirements" in out
+    assert "path.csv" in err
+    rows = (tmp_path / "path.csv").read_text(encoding="utf-8").splitlines()
+    assert f"{len(rows) - 1} points" in out.splitlines()[0]
+    status, out, err = cli("path", tmp_path, "--to", "first", "--html", tmp_path / "path.html")
+    assert (status, out.splitlines()[0]) == (0, "schunk_oil_bottle: path of length 0 from chart 0 to chart 0, 1 points")
+    for words, message in ((("--from", "top"), "'top' names no grasp"), (("--to", "99999"), "end 99999 is no chart")):
+        status, out, err = cli("path", tmp_path, *words)
+        assert (status, out, err.count("\n")) == (2, "", 1)
+        assert message in err

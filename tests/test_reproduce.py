@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
-from test_viewer import BROWSER_FLAGS, find_browser
+from screens import BROWSER_FLAGS, find_browser
 
 import graspatlas as ga
 from graspatlas.local_search import climb, local_maxima, peaks_of

@@ -1,11 +1,8 @@
-"""The viewer: meshes, velocity ellipsoid, picture, page and live view."""
+"""The viewer: meshes, velocity ellipsoid, scene and picture."""
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,12 +11,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
-from PIL import Image
 from scipy.spatial import cKDTree
+from screens import pixels, share
 
 import graspatlas as ga
-from graspatlas.viewer import bodies, ellipsoid, export_html, meshes, save_picture, sketch, view
-from graspatlas.viewer.live import close
+from graspatlas.viewer import bodies, ellipsoid, export_html, meshes, save_picture, sketch
 from graspatlas.viewer.raster import nearest
 from graspatlas.viewer.scene import CONTACT_RADIUS, Scene
 from graspatlas.viewer.shading import to_linear, to_screen
@@ -40,29 +36,10 @@ def picture(bottle_result: ga.Result, tmp_path_factory: pytest.TempPathFactory) 
     return pixels(path)
 
 
-def pixels(path: Path) -> Array:
-    with Image.open(path) as image:
-        return np.asarray(image.convert("RGB"), float) / 255.0
-
-
 def volume(mesh: meshes.Mesh) -> float:
     """Volume that a closed mesh encloses; negative when it is inside out."""
     a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
     return float(np.sum(a * np.cross(b, c))) / 6.0
-
-
-def share(picture: Array, colour: str) -> float:
-    """How much of a picture has the can's blue, the oil's yellow, the contacts' red or the hand's grey."""
-    red, green, blue = (picture[..., k] for k in range(3))
-    if colour == "blue":
-        found = (blue > 0.3) & (blue > 1.8 * red) & (blue > 1.25 * green)
-    elif colour == "yellow":
-        found = (np.minimum(red, green) > 0.35) & (blue < 0.8 * np.minimum(red, green))
-    elif colour == "red":
-        found = (red > 0.5) & (np.maximum(green, blue) < 0.3)
-    else:
-        found = (np.ptp(picture, axis=-1) < 0.05) & (red > 0.45) & (red < 0.78)
-    return float(found.mean())
 
 
 # Meshes
@@ -375,102 +352,6 @@ def test_a_path_that_cannot_be_written_is_named(can_result: ga.Result, tmp_path:
     with pytest.raises(ga.GraspAtlasError, match=r"cannot write.*folder"):
         write(can_result, tmp_path / "folder.png")  # type: ignore[operator]
     assert [path.name for path in tmp_path.iterdir()] == ["folder.png"]
-
-
-# Page and live view
-
-
-def test_page_needs_no_network(result: ga.Result, tmp_path: Path) -> None:
-    path = tmp_path / "page.html"
-    export_html(result, path)
-    text = path.read_text(encoding="utf-8")
-    assert f"<title>graspatlas: {result.problem.name}</title>" in text
-    for words in ("manipulability volume: best ", "worst ", "contact point", "complete"):
-        assert words in text
-    addresses = set(re.findall(r"(?:https?:)?//[\w.-]+\.[a-z]{2,}[^\s\"'<>)]*", text.replace("http://www.w3.org/", "")))
-    assert not re.findall(r"<(?:script|link|img|iframe)[^>]+(?:src|href)\s*=", text)
-    assert not {address for address in addresses if address.startswith("http")}
-    assert len(text) < 6e6
-
-
-def test_names_cannot_break_the_page(can_result: ga.Result, tmp_path: Path) -> None:
-    named = replace(can_result, problem=replace(can_result.problem, name="<script>alert(1)</script> & $title"))
-    export_html(named, tmp_path / "page.html")
-    text = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert "<script>alert" not in text
-    assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; $title" in text
-
-
-def test_view_serves_the_page_and_ends(can_result: ga.Result, capsys: pytest.CaptureFixture[str]) -> None:
-    visualizer = view(can_result, open_browser=False, wait=False)
-    try:
-        assert visualizer.url() in capsys.readouterr().err
-        assert visualizer.static_html().count("fetch(") > 12
-    finally:
-        close(visualizer)
-    assert visualizer.window.server_proc.returncode is not None
-
-
-def test_view_ends_cleanly_when_interrupted(can_result: ga.Result, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt(seconds: float) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("graspatlas.viewer.live.time.sleep", interrupt)
-    visualizer = view(can_result, open_browser=False)
-    assert visualizer.window.server_proc.returncode is not None
-
-
-BROWSER_FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--window-size=1200,800",
-    "--virtual-time-budget=8000",
-    "--enable-logging=stderr",
-    "--v=0",
-]
-
-
-def find_browser() -> str:
-    for name in ("chromium", "chromium-browser", "google-chrome"):
-        if found := shutil.which(name):
-            return found
-    if os.environ.get("GRASPATLAS_REQUIRE_BROWSER") == "1":
-        pytest.fail("no chromium, chromium-browser or google-chrome")
-    pytest.skip("no chromium, chromium-browser or google-chrome")
-
-
-@pytest.mark.browser
-def test_page_renders_in_a_browser(bottle_result: ga.Result, tmp_path: Path) -> None:
-    browser = find_browser()
-    export_html(bottle_result, tmp_path / "page.html")
-    screenshot = tmp_path / "page.png"
-    run = subprocess.run(
-        [
-            browser,
-            *BROWSER_FLAGS,
-            f"--user-data-dir={tmp_path / 'profile'}",
-            f"--screenshot={screenshot}",
-            (tmp_path / "page.html").as_uri(),
-        ],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-    )
-    # What goes wrong in a page is printed as '[...:ERROR:CONSOLE:12] "..."' or '[...:INFO:CONSOLE:12] "Uncaught ..."'.
-    console = [line for line in run.stderr.splitlines() if "CONSOLE" in line]
-    assert not [line for line in console if re.search(r":ERROR:CONSOLE|Uncaught|THREE\.|Unsupported", line)]
-    shown = pixels(screenshot)
-    for half in (shown[:, :600], shown[:, 600:]):
-        assert share(half, "yellow") > 0.02
-        assert share(half, "grey") > 0.02
-        assert share(half, "red") > 0.0001
 
 
 def test_a_picture_is_a_png(can_result: ga.Result, tmp_path: Path) -> None:

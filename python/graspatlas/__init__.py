@@ -15,6 +15,7 @@ from graspatlas.local_search import Climb, Peak, climb, local_maxima, peaks_of
 from graspatlas.motions import HandMotions
 from graspatlas.optimizer import build_atlas, optimize
 from graspatlas.pareto import pareto_front
+from graspatlas.paths import GraspPath, Path, shortest_path
 from graspatlas.problem import Problem
 from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.projection import project
@@ -54,10 +55,12 @@ __all__ = [
     "ForceClosure",
     "Grasp",
     "GraspAtlasError",
+    "GraspPath",
     "Grasps",
     "Hand",
     "HandMotions",
     "JointMargin",
+    "Path",
     "Peak",
     "Problem",
     "Refinement",
@@ -95,6 +98,7 @@ __all__ = [
     "quality",
     "refine",
     "save_picture",
+    "shortest_path",
     "systems",
     "view",
 ]

@@ -1,4 +1,4 @@
-"""Command line: graspatlas list, optimize, view, pareto, densify, check-result, reproduce."""
+"""Command line: the commands of graspatlas."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from graspatlas import __version__
 from graspatlas.atlas import Status
 from graspatlas.components import Components, SearchStatus, find_components
 from graspatlas.errors import GraspAtlasError
+from graspatlas.files import replaced
 from graspatlas.optimizer import optimize
 from graspatlas.pareto import knee, pareto_front, values_of
+from graspatlas.paths import GraspPath, shortest_path
 from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.quality import INDICES, quality_name
 from graspatlas.requirements import REQUIREMENTS, parse_requirement
 from graspatlas.result import Result, load_result, writable_folder
 from graspatlas.sampling import Samples, densify
-from graspatlas.viewer.files import replaced
 
 __all__ = ["main"]
 
@@ -150,6 +151,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     denser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
     denser.set_defaults(run=_densify)
+    way = commands.add_parser("path", help="find the shortest path between two grasps of a result that never lets go")
+    way.add_argument("result", type=Path, help="folder or file that optimize wrote")
+    where = "number of a chart, or first, best or worst"
+    way.add_argument("--from", dest="start", default="first", metavar="CHART", help=f"{where}; first by default")
+    way.add_argument("--to", dest="end", default="best", metavar="CHART", help=f"{where}; best by default")
+    way.add_argument("--feasible", action="store_true", help="only through grasps that meet the result's requirements")
+    way.add_argument("--csv", type=Path, metavar="FILE", help="write a table: joints, pose of the object, quality")
+    way.add_argument("--html", type=Path, metavar="FILE", help="write a page with a slider that needs no server")
+    way.add_argument("--picture", type=Path, metavar="FILE", help="write a PNG picture of six grasps on the way")
+    way.set_defaults(run=_path)
 
     verify = commands.add_parser("check-result", help="verify a result again, from the problem that it carries")
     verify.add_argument("result", type=Path, help="folder or file that optimize wrote")
@@ -400,6 +411,42 @@ def _sample_lines(result: Result, samples: Samples, folder: Path) -> list[str]:
     if result.feasible.any():
         lines.append(f"  best centre of a chart {result.best.quality:.9g}")
     return [*lines, f"  written to {folder / 'samples.npz'}"]
+
+
+def _path(options: argparse.Namespace) -> int:
+    result = load_result(options.result)
+    start, end = (_chart(result, name) for name in (options.start, options.end))
+    path = shortest_path(result, start, end, feasible=options.feasible, progress=True)
+    print(
+        f"{result.problem.name}: path of length {path.length:.6g} from chart {start} to chart {end}, {len(path)} points"
+    )
+    if not path.tight:
+        print("  cut short: a shorter one may exist nearby")
+    print(f"  largest residual {path.residuals.max():.1e}")
+    if path.knows_quality:
+        lowest = int(path.qualities.argmin())
+        print(f"  {quality_name(result.quality)}: smallest {path.qualities[lowest]:.6g}, at point {lowest}")
+    if result.requirements and path.knows_requirements:
+        print(f"  {path.feasible.sum()} of {len(path)} points meet the requirements")
+    from graspatlas.viewer import export_html, save_picture
+
+    writers = ((options.csv, GraspPath.save_csv), (options.html, export_html), (options.picture, save_picture))
+    for file, write in writers:
+        if file:
+            write(path, file)
+            print(f"wrote {file}", file=sys.stderr)
+    return 0
+
+
+def _chart(result: Result, name: str) -> int:
+    """The chart that a word names."""
+    if name == "first":
+        return 0
+    if name in ("best", "worst"):
+        return int(getattr(result, name).chart)
+    if name.isascii() and name.isdigit():
+        return int(name)
+    raise GraspAtlasError(f"'{name}' names no grasp; give the number of a chart, or first, best or worst")
 
 
 def _check_result(options: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""A result to look at: in a browser, as a page and as a picture.
+"""A result or a path to look at: in a browser, as a page and as a picture.
 
 What draws it is imported when it is first used, so that importing the package stays quick.
 """
@@ -9,6 +9,7 @@ import os
 from typing import TYPE_CHECKING
 
 from graspatlas.errors import GraspAtlasError
+from graspatlas.paths import Path
 from graspatlas.result import Result
 
 if TYPE_CHECKING:
@@ -17,13 +18,13 @@ if TYPE_CHECKING:
 __all__ = ["export_html", "save_picture", "view"]
 
 
-def view(result: Result, *, open_browser: bool = True, wait: bool = True) -> meshcat.Visualizer:
-    """Show the best and the worst grasp side by side in a browser.
+def view(shown: Result | Path, *, open_browser: bool = True, wait: bool = True) -> meshcat.Visualizer:
+    """Show the best and the worst grasp of a result side by side in a browser; or a path, as a film.
 
-    The page's address is printed to standard error.
+    The page's address is printed to standard error. Meshcat's controls, top right, play a film and have its slider.
 
     Args:
-        result: The result.
+        shown: The result, or a path of grasps.
         open_browser: Whether to open the page in the browser.
         wait: Whether to serve the page until Ctrl-C is pressed; otherwise it is served until the program ends.
 
@@ -35,34 +36,41 @@ def view(result: Result, *, open_browser: bool = True, wait: bool = True) -> mes
     """
     from graspatlas.viewer.live import show
 
-    return show(result, open_browser=open_browser, wait=wait)
+    return show(_checked(shown), open_browser=open_browser, wait=wait)
 
 
-def export_html(result: Result, path: str | os.PathLike[str]) -> None:
-    """Write the best and the worst grasp as one page to turn about in a browser.
+def export_html(shown: Result | Path, path: str | os.PathLike[str]) -> None:
+    """Write the best and the worst grasp of a result as one page to turn about in a browser; or a path, with a slider.
 
-    The page opens from the disk; it needs neither a server nor the network.
+    The page opens from the disk; it needs neither a server nor the network. That of a path opens at the frame that its
+    address names, such as ``path.html#frame=30``.
 
     Args:
-        result: The result.
+        shown: The result, or a path of grasps.
         path: Such as ``"can.html"``; an existing file is replaced.
 
     Raises:
         GraspAtlasError: If a mesh cannot be read or the file cannot be written.
     """
-    from graspatlas.viewer.files import replaced
+    from graspatlas.files import replaced
+    from graspatlas.viewer.film import Film
+    from graspatlas.viewer.film_page import film_page
     from graspatlas.viewer.page import page
     from graspatlas.viewer.scene import Scene
 
+    shown = _checked(shown)
     with replaced(path) as stream:
-        stream.write(page(Scene(result)).encode("utf-8"))
+        text = film_page(Film(shown)) if isinstance(shown, Path) else page(Scene(shown))
+        stream.write(text.encode("utf-8"))
 
 
-def save_picture(result: Result, path: str | os.PathLike[str], *, width: int = 1600, height: int = 900) -> None:
-    """Write a picture of the best and the worst grasp as a PNG file; it needs neither browser nor graphics card.
+def save_picture(shown: Result | Path, path: str | os.PathLike[str], *, width: int = 1600, height: int = 900) -> None:
+    """Write a picture of the best and the worst grasp, or six grasps of a path, as a PNG file.
+
+    It needs neither browser nor graphics card.
 
     Args:
-        result: The result.
+        shown: The result, or a path of grasps.
         path: Such as ``"can.png"``; an existing file is replaced.
         width: Width in pixels, at least 320.
         height: Height in pixels, at least 180.
@@ -70,12 +78,25 @@ def save_picture(result: Result, path: str | os.PathLike[str], *, width: int = 1
     Raises:
         GraspAtlasError: If the size is too small, a mesh cannot be read or the file cannot be written.
     """
-    from graspatlas.viewer.files import replaced
+    from graspatlas.files import replaced
+    from graspatlas.viewer.film import Film
     from graspatlas.viewer.picture import check_size, draw
     from graspatlas.viewer.scene import Scene
+    from graspatlas.viewer.strip import FRAMES, draw_strip
 
     if os.path.splitext(path)[1].lower() != ".png":
         raise GraspAtlasError(f"a picture's name must end in .png, not '{os.fspath(path)}'")
     check_size(width, height)
+    shown = _checked(shown)
     with replaced(path) as stream:
-        draw(Scene(result), width, height).save(stream, "PNG")
+        if isinstance(shown, Path):
+            image = draw_strip(Film(shown, FRAMES), width, height)
+        else:
+            image = draw(Scene(shown), width, height)
+        image.save(stream, "PNG")
+
+
+def _checked(shown: object) -> Result | Path:
+    if isinstance(shown, Result | Path):
+        return shown
+    raise GraspAtlasError(f"only a graspatlas.Result or a path of grasps can be shown, got {type(shown).__name__}")

@@ -12,7 +12,10 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 from graspatlas.errors import GraspAtlasError
+from graspatlas.paths import Path
 from graspatlas.result import Result
+from graspatlas.viewer.film import Film
+from graspatlas.viewer.film_page import film_animation, film_caption, film_commands
 from graspatlas.viewer.page import commands
 from graspatlas.viewer.scene import Scene
 
@@ -22,14 +25,18 @@ if TYPE_CHECKING:
 __all__ = ["close", "show"]
 
 
-def show(result: Result, *, open_browser: bool, wait: bool) -> meshcat.Visualizer:
-    """Serve a result's scene; see :func:`graspatlas.viewer.view`."""
-    scene = Scene(result)
+def show(shown: Result | Path, *, open_browser: bool, wait: bool) -> meshcat.Visualizer:
+    """Serve a result's scene, or a path's film; see :func:`graspatlas.viewer.view`."""
+    if isinstance(shown, Path):
+        film = Film(shown)
+        name, told = film.path.result.problem.name, [*film_commands(film), film_caption(film), film_animation(film)]
+    else:
+        name, told = shown.problem.name, list(commands(Scene(shown), with_legend=True))
     visualizer = _start()
     try:
-        for command in commands(scene, with_legend=True):
+        for command in told:
             visualizer.window.send(_Command(command))
-        print(f"{result.problem.name} at {visualizer.url()}", file=sys.stderr)
+        print(f"{name} at {visualizer.url()}", file=sys.stderr)
         if open_browser:
             visualizer.open()
         if wait:

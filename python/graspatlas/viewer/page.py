@@ -6,7 +6,7 @@ import base64
 import html
 import importlib.util
 import io
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib import resources
 from pathlib import Path
 from string import Template
@@ -19,12 +19,26 @@ from PIL import Image
 from graspatlas.errors import GraspAtlasError
 from graspatlas.viewer.camera import Camera
 from graspatlas.viewer.lettering import caption_image, legend_image
-from graspatlas.viewer.scene import SHOW_THROUGH, Scene
+from graspatlas.viewer.scene import SHOW_THROUGH, Colour, Part, Scene
 from graspatlas.viewer.shading import FloorShadow
 from graspatlas.viewer.three import ground, group, light, mesh, perspective_camera, sprite
 from graspatlas.viewer.words import caption, index_name, legend, subtitle
 
-__all__ = ["commands", "page"]
+__all__ = [
+    "ASPECT",
+    "LETTERS",
+    "ROOT",
+    "THROUGH",
+    "Command",
+    "commands",
+    "filled_page",
+    "floor_shadow",
+    "legend_rows",
+    "page",
+    "png_bytes",
+    "set_object",
+    "studio",
+]
 
 Array = NDArray[np.float64]
 Command = dict[str, Any]
@@ -50,20 +64,35 @@ CAPTION_WIDTH, CAPTION_HEIGHT = 0.9, 0.115
 
 def page(scene: Scene) -> str:
     """The page's text."""
+    return filled_page(scene.result.problem.name, commands(scene), legend_html(scene))
+
+
+def filled_page(name: str, commands: Iterable[Command], legend: str, player: str = "", script: str = "") -> str:
+    """The page of some commands.
+
+    Args:
+        name: What it shows, for the title.
+        commands: What meshcat is told.
+        legend: HTML of the foot.
+        player: HTML of what stands above the foot, if anything.
+        script: HTML of what runs after the page's own script.
+    """
     import umsgpack
 
-    data = [base64.b64encode(umsgpack.packb(command)).decode("ascii") for command in commands(scene)]
+    data = [base64.b64encode(umsgpack.packb(command)).decode("ascii") for command in commands]
     template = Template((resources.files("graspatlas.viewer") / "page.html").read_text(encoding="utf-8"))
     return template.substitute(
-        title=html.escape(f"graspatlas: {scene.result.problem.name}"),
-        legend=_legend_html(scene),
-        meshcat=_meshcat_script(),
+        title=html.escape(f"graspatlas: {name}"),
+        legend=legend,
+        player=player,
+        script=script,
+        meshcat=meshcat_script(),
         commands=",\n".join(f'"{line}"' for line in data),
         aspect=ASPECT,
     )
 
 
-def _meshcat_script() -> str:
+def meshcat_script() -> str:
     """Text of meshcat's viewer; found without importing meshcat, which would load its server."""
     spec = importlib.util.find_spec("meshcat")
     for folder in (spec.submodule_search_locations or []) if spec else []:
@@ -73,13 +102,17 @@ def _meshcat_script() -> str:
     raise GraspAtlasError("meshcat's viewer is not installed; install it with 'pip install meshcat'")
 
 
-def _legend_html(scene: Scene) -> str:
+def legend_html(scene: Scene) -> str:
     """The page's foot: problem, status, values, colours."""
     name, rest = subtitle(scene.result).split(": ", 1)
     values = ", ".join(f"{e.name} {e.grasp.quality:.3g} (chart {e.grasp.chart})" for e in scene.exhibits)
-    values = f"{index_name(scene.result)}: {values}"
-    rows = [f"<b>{html.escape(name)}</b>", *(f"<span>{html.escape(text)}</span>" for text in (rest, values))]
-    for colour, text in legend():
+    return legend_rows(name, [rest, f"{index_name(scene.result)}: {values}"], legend())
+
+
+def legend_rows(name: str, texts: list[str], colours: list[tuple[Colour, str]]) -> str:
+    """A name, texts, and what colours stand for, as HTML."""
+    rows = [f"<b>{html.escape(name)}</b>", *(f"<span>{html.escape(text)}</span>" for text in texts)]
+    for colour, text in colours:
         css = ", ".join(str(round(255.0 * c)) for c in colour[:3])
         dot = f'<i style="background: rgba({css}, {1.0 if colour[3] >= 1.0 else 0.6})"></i>'
         rows.append(f"<span>{dot}{html.escape(text)}</span>")
@@ -94,7 +127,7 @@ def commands(scene: Scene, *, with_legend: bool = False) -> Iterator[Command]:
         with_legend: Whether the colours are explained below the captions.
     """
     camera = scene.camera(ASPECT, WINDOW)
-    yield from _studio(camera)
+    yield from studio(camera)
     centred = np.eye(4)
     centred[:3, 3] = -camera.target
     yield {"type": "set_transform", "path": ROOT, "matrix": centred.T.ravel().tolist()}
@@ -106,44 +139,44 @@ def commands(scene: Scene, *, with_legend: bool = False) -> Iterator[Command]:
                 through = THROUGH * SHOW_THROUGH[name]
                 members += [mesh(part.mesh, part.T, part.colour, through=through) for part in parts]
             if members:
-                yield _object(f"{ROOT}/{exhibit.name}/{name}", group(members))
-    yield _object(f"{ROOT}/floor", _floor(scene))
+                yield set_object(f"{ROOT}/{exhibit.name}/{name}", group(members))
+    yield set_object(f"{ROOT}/floor", floor_shadow(part for exhibit in scene.exhibits for part in exhibit.parts))
     yield from _captions(scene, camera, with_legend)
 
 
-def _object(path: str, content: dict[str, Any]) -> Command:
+def set_object(path: str, content: dict[str, Any]) -> Command:
+    """Command that shows an object at a path of meshcat's tree."""
     return {"type": "set_object", "path": path, "object": content}
 
 
-def _property(path: str, name: str, value: Any) -> Command:
+def set_property(path: str, name: str, value: Any) -> Command:
     return {"type": "set_property", "path": path, "property": name, "value": value}
 
 
-def _studio(camera: Camera) -> Iterator[Command]:
+def studio(camera: Camera) -> Iterator[Command]:
     """Background, lamps and camera."""
     for path in ("Grid", "Axes", "Lights/SpotLight", "Lights/PointLightNegativeX", "Lights/PointLightPositiveX"):
-        yield _property(f"/{path}", "visible", False)
-    yield _property("/Lights/FillLight", "visible", False)
-    yield _property("/Lights/AmbientLight/<object>", "intensity", 0.42)
+        yield set_property(f"/{path}", "visible", False)
+    yield set_property("/Lights/FillLight", "visible", False)
+    yield set_property("/Lights/AmbientLight/<object>", "intensity", 0.42)
     for name, colour in zip(("top_color", "bottom_color"), BACKGROUND, strict=True):
-        yield _property("/Background", name, list(colour))
+        yield set_property("/Background", name, list(colour))
     for i, (place, intensity) in enumerate(LAMPS):
         path = f"/Lights/lamp_{i}"
-        yield _object(path, light(np.asarray(place) @ camera.axes, intensity))
-        yield _property(f"{path}/<object>", "castShadow", i == 0)
+        yield set_object(path, light(np.asarray(place) @ camera.axes, intensity))
+        yield set_property(f"{path}/<object>", "castShadow", i == 0)
     x, y, z = (float(c) for c in camera.distance * camera.direction)
-    yield _object("/Cameras/default/rotated", perspective_camera(camera.field_of_view))
-    yield _property("/Cameras/default/rotated/<object>", "position", [x, z, -y])
+    yield set_object("/Cameras/default/rotated", perspective_camera(camera.field_of_view))
+    yield set_property("/Cameras/default/rotated/<object>", "position", [x, z, -y])
 
 
-def _floor(scene: Scene) -> dict[str, Any]:
-    """The shadow on the floor, as a see-through picture."""
-    bodies = [p for exhibit in scene.exhibits for p in exhibit.parts if p.group in ("hand", "object")]
-    placed = [part.mesh.moved(part.T) for part in bodies]
+def floor_shadow(parts: Iterable[Part]) -> dict[str, Any]:
+    """The shadow of hands and objects on the floor, as a see-through picture."""
+    placed = [part.mesh.moved(part.T) for part in parts if part.group in ("hand", "object")]
     floor = FloorShadow(np.concatenate([shape.vertices[shape.faces] for shape in placed]))
     pixels = np.zeros((*floor.dark.shape, 4), np.uint8)
     pixels[..., 3] = np.round(255.0 * np.clip(FLOOR_DARKNESS * floor.dark, 0.0, 1.0))
-    return ground(_png(Image.fromarray(pixels)), *floor.corners)
+    return ground(png_bytes(Image.fromarray(pixels)), *floor.corners)
 
 
 def _captions(scene: Scene, camera: Camera, with_legend: bool) -> Iterator[Command]:
@@ -159,15 +192,16 @@ def _captions(scene: Scene, camera: Camera, with_legend: bool) -> Iterator[Comma
     height = pixel * images[0].height
     for exhibit, middle, image in zip(scene.exhibits, middles, images, strict=True):
         place = camera.target + np.array([middle, bottom - 0.65 * height]) @ camera.axes[:2]
-        yield _object(f"{ROOT}/{exhibit.name}/caption", sprite(_png(image), place, pixel * image.width, height))
+        yield set_object(f"{ROOT}/{exhibit.name}/caption", sprite(png_bytes(image), place, pixel * image.width, height))
     if with_legend:
         image = legend_image(legend(), 0.5 * LETTERS)
         middle = (middles[0] + middles[1]) / 2.0
         place = camera.target + np.array([middle, bottom - 1.4 * height]) @ camera.axes[:2]
-        yield _object(f"{ROOT}/legend", sprite(_png(image), place, pixel * image.width, pixel * image.height))
+        yield set_object(f"{ROOT}/legend", sprite(png_bytes(image), place, pixel * image.width, pixel * image.height))
 
 
-def _png(image: Image.Image) -> bytes:
+def png_bytes(image: Image.Image) -> bytes:
+    """A picture as a PNG file."""
     stream = io.BytesIO()
     image.save(stream, "PNG")
     return stream.getvalue()

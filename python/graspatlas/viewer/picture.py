@@ -16,7 +16,7 @@ from graspatlas.viewer.scene import SHOW_THROUGH, Part, Scene
 from graspatlas.viewer.shading import FloorShadow, Shadow, crevices, dots, lamps, shade, to_linear, to_screen
 from graspatlas.viewer.words import caption, legend, subtitle
 
-__all__ = ["check_size", "draw"]
+__all__ = ["check_size", "draw", "painted"]
 
 Array = NDArray[np.float64]
 FloatArray = NDArray[np.float32]
@@ -48,15 +48,19 @@ def check_size(width: int, height: int) -> None:
 def draw(scene: Scene, width: int, height: int) -> Image.Image:
     """The picture of a scene, with captions."""
     camera = scene.camera(width / height, WINDOW)
-    painter = _Painter(scene, camera, width * SAMPLES, height * SAMPLES)
+    image = painted([part for exhibit in scene.exhibits for part in exhibit.parts], camera, width, height)
+    _write(image, scene, camera)
+    return image
+
+
+def painted(parts: list[Part], camera: Camera, width: int, height: int) -> Image.Image:
+    """Parts as a camera sees them, without words."""
+    painter = _Painter(parts, camera, width * SAMPLES, height * SAMPLES)
     samples = painter.paint().reshape(height, SAMPLES, width, SAMPLES, 3)
     light = np.zeros((height, width, 3))
     for i, j in np.ndindex(SAMPLES, SAMPLES):
         light += samples[:, i, :, j] / SAMPLES**2
-    pixels = np.round(255.0 * np.clip(to_screen(light), 0.0, 1.0)).astype(np.uint8)
-    image = Image.fromarray(pixels)
-    _write(image, scene, camera)
-    return image
+    return Image.fromarray(np.round(255.0 * np.clip(to_screen(light), 0.0, 1.0)).astype(np.uint8))
 
 
 def _write(image: Image.Image, scene: Scene, camera: Camera) -> None:
@@ -82,10 +86,11 @@ class _Triangles:
 
     def __init__(self, parts: list[Part], camera: Camera, width: int, height: int) -> None:
         placed = [part.mesh.moved(part.T) for part in parts]
-        self.points = np.concatenate([m.vertices[m.faces] for m in placed])
-        self.normals = np.concatenate([m.normals[m.faces] for m in placed]).astype(np.float32)
+        none = np.zeros((0, 3, 3))
+        self.points = np.concatenate([none, *(m.vertices[m.faces] for m in placed)])
+        self.normals = np.concatenate([none, *(m.normals[m.faces] for m in placed)]).astype(np.float32)
         owner = np.repeat(np.arange(len(parts)), [len(m.faces) for m in placed])
-        colours = np.array([part.colour for part in parts])
+        colours = np.array([part.colour for part in parts]).reshape(-1, 4)
         self.colours = np.column_stack([to_linear(colours[:, :3]), colours[:, 3]]).astype(np.float32)[owner]
         seen = camera.project(self.points.reshape(-1, 3), width / height)
         x, y = (seen[:, 0] + 1.0) * width / 2.0, (1.0 - seen[:, 1]) * height / 2.0
@@ -102,12 +107,11 @@ class _Triangles:
 
 
 class _Painter:
-    """Paints a scene into an array of linear light, from back to front."""
+    """Paints parts into an array of linear light, from back to front."""
 
-    def __init__(self, scene: Scene, camera: Camera, width: int, height: int) -> None:
+    def __init__(self, parts: list[Part], camera: Camera, width: int, height: int) -> None:
         self.camera, self.width, self.height = camera, width, height
         self.lamps = lamps(camera)
-        parts = [part for exhibit in scene.exhibits for part in exhibit.parts]
         marks = [p for p in parts if p.group in SHOW_THROUGH]
         bodies = [p for p in parts if p.group in ("hand", "object")]
         self.solid = self._triangles([p for p in parts if p.colour[3] >= 1.0])

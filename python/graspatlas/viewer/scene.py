@@ -16,7 +16,21 @@ from graspatlas.viewer.ellipsoid import velocity_ellipsoid
 from graspatlas.viewer.meshes import Mesh, arrow, ellipsoid, merged
 from graspatlas.viewer.viewpoint import Subject, best_direction
 
-__all__ = ["COLOURS", "SHOW_THROUGH", "Colour", "Exhibit", "Part", "Scene", "grasp_parts"]
+__all__ = [
+    "COLOURS",
+    "SHOW_THROUGH",
+    "Colour",
+    "Exhibit",
+    "Part",
+    "Scene",
+    "body_parts",
+    "direction_to",
+    "fitted_camera",
+    "grasp_parts",
+    "size_of",
+    "subject_of",
+    "vertices_of",
+]
 
 Array = NDArray[np.float64]
 #: Red, green, blue and opacity, each 0 to 1.
@@ -83,7 +97,7 @@ class Exhibit:
     @cached_property
     def points(self) -> Array:
         """Vertices of hand and object [n, 3]."""
-        return _vertices(list(self.parts))
+        return vertices_of(list(self.parts))
 
 
 class Scene:
@@ -100,11 +114,10 @@ class Scene:
         self.result = result
         shapes = BodyShapes(result.problem)
         grasps = (("best", result.best), ("worst", result.worst))
-        size = _size(body_parts(shapes, result.best))
+        size = size_of(body_parts(shapes, result.best))
         sides = [(name, grasp, *grasp_parts(shapes, grasp, size)) for name, grasp in grasps]
-        planar = len(result.best.G) < 6
-        subjects = [_subject(parts, grasp, size) for _, grasp, parts, _ in sides]
-        self.direction = FROM_ABOVE / np.linalg.norm(FROM_ABOVE) if planar else best_direction(subjects)
+        subjects = [subject_of(parts, grasp, size) for _, grasp, parts, _ in sides]
+        self.direction = direction_to(subjects, planar=len(result.best.G) < 6)
         right = Camera(np.zeros(3), self.direction, 1.0).axes[0]
         #: Best, then worst.
         self.exhibits = tuple(
@@ -120,18 +133,28 @@ class Scene:
             window: Left, right, bottom and top of the window; the picture spans -1 to 1 both ways.
         """
         points = np.concatenate([exhibit.points for exhibit in self.exhibits])
-        low, high = np.array([window[0], window[2]]), np.array([window[1], window[3]])
-        camera = Camera(points.mean(axis=0), self.direction, 1.0)
-        for _ in range(MAX_FRAMING_STEPS):
-            seen = camera.project(points, aspect)[:, :2]
-            size = float((np.ptp(seen, axis=0) / (high - low)).max())
-            shift = (seen.min(axis=0) + seen.max(axis=0) - size * (low + high)) / 2.0
-            half = camera.distance * np.tan(camera.field_of_view / 2.0)
-            target = camera.target + half * (shift * [aspect, 1.0]) @ camera.axes[:2]
-            camera = Camera(target, self.direction, camera.distance * size)
-            if abs(size - 1.0) < 1e-8 and np.abs(shift).max() < 1e-8:
-                break
-        return camera
+        return fitted_camera(points, self.direction, aspect, window)
+
+
+def direction_to(subjects: list[Subject], *, planar: bool) -> Array:
+    """Unit vector [3] towards the camera: from above in the plane, else from where most is seen."""
+    return FROM_ABOVE / np.linalg.norm(FROM_ABOVE) if planar else best_direction(subjects)
+
+
+def fitted_camera(points: Array, direction: Array, aspect: float, window: tuple[float, float, float, float]) -> Camera:
+    """Camera that shows points [n, 3] from a direction [3] inside a window of its picture; see :meth:`Scene.camera`."""
+    low, high = np.array([window[0], window[2]]), np.array([window[1], window[3]])
+    camera = Camera(points.mean(axis=0), direction, 1.0)
+    for _ in range(MAX_FRAMING_STEPS):
+        seen = camera.project(points, aspect)[:, :2]
+        size = float((np.ptp(seen, axis=0) / (high - low)).max())
+        shift = (seen.min(axis=0) + seen.max(axis=0) - size * (low + high)) / 2.0
+        half = camera.distance * np.tan(camera.field_of_view / 2.0)
+        target = camera.target + half * (shift * [aspect, 1.0]) @ camera.axes[:2]
+        camera = Camera(target, direction, camera.distance * size)
+        if abs(size - 1.0) < 1e-8 and np.abs(shift).max() < 1e-8:
+            break
+    return camera
 
 
 def body_parts(shapes: BodyShapes, grasp: Grasp) -> list[Part]:
@@ -169,18 +192,18 @@ def grasp_parts(shapes: BodyShapes, grasp: Grasp, size: float = 1.0) -> tuple[li
     return parts, semi_axes
 
 
-def _vertices(parts: list[Part], groups: tuple[str, ...] = ("hand", "object")) -> Array:
+def vertices_of(parts: list[Part], groups: tuple[str, ...] = ("hand", "object")) -> Array:
     """All vertices of parts of some groups [n, 3]."""
     return np.concatenate([p.mesh.moved(p.T).vertices for p in parts if p.group in groups])
 
 
-def _size(parts: list[Part]) -> float:
+def size_of(parts: list[Part]) -> float:
     """Size of hand and object compared with that which the scene is made for; 1 when they are about alike."""
-    size = float(np.linalg.norm(np.ptp(_vertices(parts), axis=0))) / USUAL_SIZE
+    size = float(np.linalg.norm(np.ptp(vertices_of(parts), axis=0))) / USUAL_SIZE
     return 1.0 if 0.6 < size < 1.6 else size
 
 
-def _subject(parts: list[Part], grasp: Grasp, size: float) -> Subject:
+def subject_of(parts: list[Part], grasp: Grasp, size: float) -> Subject:
     """What the camera should see; the contacts stand for an object that has no shape."""
     marks = [p for p in parts if p.group == "contact"]
     groups = [[p for p in parts if p.group == group] or marks for group in ("hand", "object")]
@@ -191,7 +214,7 @@ def _subject(parts: list[Part], grasp: Grasp, size: float) -> Subject:
 
 def _side(parts: list[Part], right: Array, sign: float, size: float) -> tuple[Part, ...]:
     """Parts scaled to the usual size and moved along the picture's right axis, half a gap from its middle."""
-    reach = float((-sign * (_vertices(parts) @ right)).max()) / size
+    reach = float((-sign * (vertices_of(parts) @ right)).max()) / size
     T = np.diag([1.0 / size, 1.0 / size, 1.0 / size, 1.0])
     T[:3, 3] = sign * (reach + GAP / 2.0) * right
     return tuple(Part(p.group, p.mesh, T @ p.T, p.colour) for p in parts)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from graspatlas.paths import GraspPath
 from graspatlas.quality import INDICES, quality_name
 from graspatlas.requirements import requirement_name
 from graspatlas.result import Result
 from graspatlas.viewer.scene import COLOURS, Colour, Exhibit
 
-__all__ = ["Caption", "caption", "index_name", "legend", "subtitle"]
+__all__ = ["Caption", "caption", "film_title", "index_name", "legend", "subtitle"]
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,15 @@ def subtitle(result: Result) -> str:
         names = ", ".join(requirement_name(r).split(":")[0].replace("_", " ") for r in result.requirements)
         those = f"; {result.feasible.sum()} meet {names}"
     return f"{result.problem.name}: atlas of {result.atlas.n_charts} charts, {result.status}{those}{unit}"
+
+
+def film_title(path: GraspPath) -> str:
+    """The problem, how long the path is, and whether it meets the requirements."""
+    those = ""
+    if path.result.requirements and path.knows_requirements:
+        met = int(path.feasible.sum())
+        those = "; all of them meet the requirements" if met == len(path) else f"; {met} of them meet the requirements"
+    return f"{path.result.problem.name}: path of length {path.length:.3g} through {len(path)} grasps{those}"
 
 
 def legend() -> list[tuple[Colour, str]]:
