@@ -38,21 +38,28 @@ def atlas_row(name: str, system: ga.systems.AnySystem, x0: Any, radius: float, e
 
 
 def grasp_rows(name: str, dimension: int, radius: float) -> None:
-    """Time the atlas of a bundled problem and the manipulability of its charts."""
+    """Time the atlas of a bundled problem and the indices of its charts."""
     problem = ga.load_problem(name)
     system = problem.system(dimension)
     atlas_row(f"{name} k={dimension} r={radius:g}", system, problem.x1_array, radius, 0.5)
     atlas = ga.build_atlas(system, problem.x1_array, radius=radius, epsilon=0.5, progress=False)
+    for index in (
+        "manipulability_volume",
+        "force_closure_margin",
+        "ferrari_canny_epsilon",
+        "ferrari_canny_volume",
+        "min_weight",
+    ):
+        index_row(index, problem, atlas)
+
+
+def index_row(index: str, problem: ga.Problem, atlas: ga.Atlas) -> None:
+    """Time a quality index on all charts of an atlas and print a row."""
     seconds, values = median_seconds(
-        lambda: ga.quality.evaluate("manipulability_volume", ga.Grasps(problem, atlas.centers, system))
+        lambda: ga.quality.evaluate(index, ga.Grasps(problem, atlas.centers, atlas.system))
     )
-    each = 1e6 * seconds / len(values)
-    print(f"{'  manipulability':32} {len(values):7d} grasps {1e3 * seconds:9.1f} ms {each:9.2f} us each")
-    seconds, values = median_seconds(
-        lambda: ga.quality.evaluate("force_closure_margin", ga.Grasps(problem, atlas.centers, system))
-    )
-    each = 1e6 * seconds / len(values)
-    print(f"{'  force closure':32} {len(values):7d} grasps {1e3 * seconds:9.1f} ms {each:9.2f} us each")
+    each, best = 1e6 * seconds / len(values), values.max()
+    print(f"{'  ' + index:32} {len(values):7d} grasps {1e3 * seconds:9.1f} ms {each:9.2f} us each   best {best:.6g}")
 
 
 def projection_row() -> None:

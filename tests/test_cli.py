@@ -353,7 +353,7 @@ def test_wrong_words_give_one_line(capsys):
 
 
 def test_part_of_a_name_finds_it(capsys):
-    assert main(["optimize", "schunk_can", "--quality", "volum"]) == 2
+    assert main(["optimize", "schunk_can", "--quality", "manipul"]) == 2
     assert "did you mean 'manipulability_volume'" in capsys.readouterr().err
 
 

@@ -32,8 +32,13 @@ __all__: list[str] = [
     "Sphere",
     "Torus",
     "TorusPatch",
+    "ball_radii",
     "force_closure_margins",
+    "force_closure_slacks",
+    "hull_volumes",
+    "min_weights",
     "project",
+    "round_ball_radii",
     "semi_axes",
 ]
 
@@ -470,6 +475,13 @@ class GraspSystem(AnySystem):
         Degrees of freedom of the object.
         """
 
+def ball_radii(
+    wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Radius of the largest ball around the origin in the hull of each grasp's wrenches [n x points x 3 or 6]; see wrench_hull.hpp.
+    """
+
 def force_closure_margins(
     system: GraspSystem,
     X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -477,6 +489,29 @@ def force_closure_margins(
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Force-closure margin of each grasp [n]; zero where a grasp is not force-closed. See force_closure.hpp.
+    """
+
+def force_closure_slacks(
+    system: GraspSystem,
+    X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    friction: typing.SupportsFloat | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Force-closure margin of each grasp with its sign [n]; -infinity where there are no internal forces. See force_closure.hpp.
+    """
+
+def hull_volumes(
+    wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Volume of the hull of each grasp's wrenches [n x points x 3 or 6]; see wrench_hull.hpp.
+    """
+
+def min_weights(
+    wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Min-weight metric, between 0 and 1, of each grasp's wrenches [n x points x 3 or 6]; see min_weight.hpp.
     """
 
 def project(
@@ -487,6 +522,13 @@ def project(
 ) -> typing.Any:
     """
     Point of the manifold above u in the tangent space at x (eqs 14 and 15); None when Newton does not converge.
+    """
+
+def round_ball_radii(
+    axes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], friction: typing.SupportsFloat | typing.SupportsIndex
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    The same for round friction cones, from the wrenches of unit forces along normal and tangents [n x 3 m x 6].
     """
 
 def semi_axes(

@@ -1,8 +1,10 @@
 r"""Quality indices of grasps.
 
-An index is a function of grasps: larger is better, and a grasp to which it does not apply has 0. Those below read the
-manipulability ellipsoid of the object (Bicchi and Prattichizzo 2000): its semi-axes are the inverses of the singular
-values of :math:`J^+ G^\top` over the coordinated motions, with lengths in millimetres.
+An index is a function of grasps: larger is better, and a grasp to which it does not apply has 0. The first three read
+the manipulability ellipsoid of the object (Bicchi and Prattichizzo 2000): its semi-axes are the inverses of the
+singular values of :math:`J^+ G^\top` over the coordinated motions, with lengths in millimetres. The others ask how well
+contact forces hold the object (see :mod:`graspatlas.wrenches`), how evenly they act on it, and how free the joints are
+to move.
 
 Your own index is any function of one :class:`~graspatlas.grasps.Grasp` that returns a number. One that takes a whole
 :class:`~graspatlas.grasps.Grasps` batch and returns an array [n] is marked by :func:`batched`::
@@ -21,18 +23,25 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from graspatlas import _core
+from graspatlas import _core, wrenches
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.grasps import Grasp, Grasps
+from graspatlas.wrenches import checked_positive
 
 __all__ = [
     "INDICES",
     "Quality",
     "batched",
     "evaluate",
+    "ferrari_canny_epsilon",
+    "ferrari_canny_volume",
     "force_closure_margin",
+    "force_closure_slack",
+    "grasp_isotropy",
     "inverse_condition_number",
+    "joint_centrality",
     "manipulability_volume",
+    "min_weight",
     "quality_name",
     "smallest_semi_axis",
 ]
@@ -40,6 +49,9 @@ __all__ = [
 Array = NDArray[np.float64]
 Quality = str | Callable[[Any], Any]
 F = TypeVar("F", bound=Callable[[Grasps], Any])
+
+#: A singular value of G this far below the largest is zero.
+RANK_TOLERANCE = 1e-9
 
 
 def batched(index: F) -> F:
@@ -135,13 +147,215 @@ def force_closure_margin(grasps: Grasps, friction: float = 0.5) -> Array:
 
     Source: Force closure as in V.-D. Nguyen, "Constructing Force-Closure Grasps", IJRR 1988, the paper's reference 14.
     """
-    return np.asarray(_core.force_closure_margins(grasps.system, grasps.x, friction))
+    return np.asarray(_core.force_closure_margins(grasps.system, grasps.x, checked_positive(friction, "friction")))
+
+
+def force_closure_slack(grasps: Grasps, friction: float = 0.5) -> Array:
+    """The force-closure margin with its sign: negative where internal forces exist but leave their cones.
+
+    It has the formula of :func:`force_closure_margin` and equals it where that is positive, so that it serves as a
+    constraint, continuous from one side of force closure to the other. It costs several times as much.
+
+    Args:
+        grasps: The grasps.
+        friction: Coefficient of friction mu.
+
+    Returns:
+        One value for each grasp [n]; minus infinity where G has lost rank, or where no internal forces press on the
+        object at all.
+    """
+    return np.asarray(_core.force_closure_slacks(grasps.system, grasps.x, checked_positive(friction, "friction")))
+
+
+def _contacts(grasps: Grasps) -> tuple[Array, Array]:
+    """Contact points and outward normals [n, m, 3] in the object's frame: torques are about its origin."""
+    R, origin = grasps.T_palm_object[:, :3, :3], grasps.T_palm_object[:, None, :3, 3]
+    return (grasps.contact_points - origin) @ R, grasps.contact_normals @ R
+
+
+def _planar(grasps: Grasps) -> bool:
+    return bool(grasps.G.shape[1] == 3)
+
+
+def _length(grasps: Grasps, length_unit: float | None) -> float:
+    """The length that divides torques: that given, or the largest arm of a contact force at x1."""
+    if length_unit is not None:
+        return checked_positive(length_unit, "length_unit")
+    points, _ = _contacts(Grasps(grasps.problem, grasps.problem.x1_array, grasps.system))
+    length = float(np.linalg.norm(points[..., : 2 if _planar(grasps) else 3], axis=2).max(initial=0.0))
+    if not length > 0.0:
+        raise GraspAtlasError(
+            f"all contacts of problem '{grasps.problem.name}' lie at the object's origin, which leaves no length to "
+            "divide torques by; move that origin or give length_unit [m]"
+        )
+    return length
+
+
+def _wrenches(grasps: Grasps, friction: float, edges: int, length_unit: float | None) -> Array:
+    length = _length(grasps, length_unit)
+    return wrenches.contact_wrenches(*_contacts(grasps), friction, edges, length, _planar(grasps))
+
+
+@batched
+def ferrari_canny_epsilon(
+    grasps: Grasps, friction: float = 0.5, length_unit: float | None = None, edges: int | None = 8
+) -> Array:
+    r"""Largest push and twist, from any side, that contacts with unit total normal force resist; 0 without closure.
+
+    .. math:: \epsilon = \min_{|w| = 1} \; \max_{v \in W} \; w^\top v, \qquad W = \mathrm{conv} \bigcup_i
+        \{ (f, \; p_i \times f / \lambda) \;:\; n_i^\top f = 1, \; f \in \mathrm{cone}_i \}
+
+    the radius of the largest ball around the origin in the hull of all contact wrenches (Ferrari and Canny's L1 space).
+    Torques are about the object's origin. The value has no unit: normal forces add up to one, and torques are in units
+    of lambda. Pyramids lie inside their cones, so epsilon grows with their edges, towards that of round cones.
+
+    Args:
+        grasps: The grasps.
+        friction: Coefficient of friction mu.
+        length_unit: Lambda, the length that divides torques [m]; by default the largest distance of a contact from the
+            object's origin at x1, so that the largest torque of a unit force is about one.
+        edges: Edges of the friction pyramids. None takes the cones round, to one part in ten thousand from
+            below, which for very symmetric grasps takes up to a second each. In the plane both are the same.
+
+    Returns:
+        One value for each grasp [n].
+
+    Raises:
+        GraspAtlasError: If an argument is out of its range.
+
+    Source: C. Ferrari, J. Canny, "Planning Optimal Grasps", ICRA 1992, with the normal forces' sum as the bound.
+    """
+    if edges is None and not _planar(grasps):
+        axes = wrenches.contact_axes(*_contacts(grasps), _length(grasps, length_unit))
+        return wrenches.round_ball_radius(axes, friction)
+    return wrenches.ball_radius(_wrenches(grasps, friction, 8 if edges is None else edges, length_unit))
+
+
+@batched
+def ferrari_canny_volume(
+    grasps: Grasps, friction: float = 0.5, length_unit: float | None = None, edges: int = 8
+) -> Array:
+    """Volume of the hull of all contact wrenches, unit total normal force; 0 without force closure.
+
+    The hull is that of :func:`ferrari_canny_epsilon`. The volume has no unit, forces being parts of the total normal
+    force and torques parts of that times `length_unit`; unlike epsilon it orders grasps alike whatever that length is.
+
+    Args:
+        grasps: The grasps.
+        friction: Coefficient of friction mu.
+        length_unit: The length that divides torques [m]; see :func:`ferrari_canny_epsilon`.
+        edges: Edges of the friction pyramids.
+
+    Returns:
+        One value for each grasp [n].
+
+    Raises:
+        GraspAtlasError: If an argument is out of its range.
+
+    Source: A. T. Miller, P. K. Allen, "Examples of 3D Grasp Quality Computations", ICRA 1999.
+    """
+    hulls = _wrenches(grasps, friction, edges, length_unit)
+    closed = wrenches.ball_radius(hulls) > 0.0
+    volumes = np.zeros(len(grasps))
+    volumes[closed] = wrenches.hull_volume(hulls[closed])
+    return volumes
+
+
+@batched
+def min_weight(grasps: Grasps, friction: float = 0.5, edges: int = 8) -> Array:
+    r"""Least share of any friction-cone edge in internal forces that use all edges, from 0, no closure, to 1.
+
+    .. math:: w \max \{ l \;:\; \sum_j \alpha_j w_j = 0, \; \sum_j \alpha_j = 1, \; \alpha_j \ge l \}
+
+    over the wrenches :math:`w_j` of the w edges of all friction pyramids: the metric :math:`l^*` of FRoGGeR, times the
+    number of edges so that 1 is the most it can be. No length divides torques: it would change nothing. It has no unit.
+
+    Args:
+        grasps: The grasps.
+        friction: Coefficient of friction mu.
+        edges: Edges of the friction pyramids; FRoGGeR takes 4. In the plane cones have two.
+
+    Returns:
+        One value for each grasp [n].
+
+    Raises:
+        GraspAtlasError: If an argument is out of its range.
+
+    Source: A. H. Li, P. Culbertson, J. W. Burdick, A. D. Ames, "FRoGGeR: Fast Robust Grasp Generation via the
+    Min-Weight Metric", IROS 2023.
+    """
+    return wrenches.min_weight(_wrenches(grasps, friction, edges, None))
+
+
+@batched
+def grasp_isotropy(grasps: Grasps, length_unit: float | None = None) -> Array:
+    r"""Smallest over largest singular value of G: 1 is forces that act alike in all directions, 0 a singular G.
+
+    .. math:: \sigma_\min(G) / \sigma_\max(G), \quad \text{torques divided by a length}
+
+    Args:
+        grasps: The grasps.
+        length_unit: The length that divides torques [m]; see :func:`ferrari_canny_epsilon`.
+
+    Returns:
+        One value, without unit, for each grasp [n].
+
+    Raises:
+        GraspAtlasError: If the length is not positive.
+
+    Source: B.-H. Kim et al., "Optimal Grasping Based on Non-Dimensionalized Performance Indices", IROS 2001; M. A. Roa,
+    R. Suárez, "Grasp Quality Measures: Review and Performance", Autonomous Robots 38 (2015), grasp isotropy index.
+    """
+    G = grasps.G.copy()
+    forces = 2 if _planar(grasps) else 3
+    G[:, forces:] /= _length(grasps, length_unit)
+    sigma = np.linalg.svd(G, compute_uv=False)[:, : G.shape[1]]
+    if sigma.shape[1] < G.shape[1]:
+        return np.zeros(len(grasps))
+    ratio = sigma[:, -1] / sigma[:, 0]
+    return np.asarray(np.where(ratio > RANK_TOLERANCE, ratio, 0.0))
+
+
+@batched
+def joint_centrality(grasps: Grasps) -> Array:
+    r"""How near the joints are to the middle of their ranges: 1 where all are there, 0 where all are at a limit.
+
+    .. math:: 1 - \frac{1}{h} \sum_{j=1}^h \left( \frac{q_j - \bar q_j}{(q_j^{max} - q_j^{min}) / 2} \right)^2
+
+    A joint without two limits counts as in the middle. The value has no unit.
+
+    Args:
+        grasps: The grasps.
+
+    Returns:
+        One value for each grasp [n].
+
+    Source: M. A. Roa, R. Suárez, "Grasp Quality Measures: Review and Performance", Autonomous Robots 38 (2015), the
+    measure of the fingers' posture, after A. Liégeois, IEEE T-SMC 7 (1977); here turned so that larger is better.
+    """
+    hand = grasps.problem.hand
+    single = [joint.q_index for joint in hand.model.hand_joints if joint.q_size == 1]
+    lower, upper = (limits[single] for limits in hand.joint_limits)
+    half = (upper - lower) / 2.0
+    limited = np.isfinite(half) & (half > 0.0)
+    deviation = (grasps.q[:, single] - (lower + upper) / 2.0)[:, limited] / half[limited]
+    return np.asarray(1.0 - (deviation**2).sum(axis=1) / max(len(hand.model.hand_joints), 1))
 
 
 #: Indices by name.
 INDICES: dict[str, Callable[[Grasps], Array]] = {
     index.__name__: index
-    for index in (inverse_condition_number, manipulability_volume, smallest_semi_axis, force_closure_margin)
+    for index in (
+        inverse_condition_number,
+        manipulability_volume,
+        smallest_semi_axis,
+        force_closure_margin,
+        ferrari_canny_epsilon,
+        ferrari_canny_volume,
+        min_weight,
+        grasp_isotropy,
+        joint_centrality,
+    )
 }
 
 

@@ -138,11 +138,11 @@ class ForceClosure(Requirement):
         return np.asarray((margins > 0.0) & (margins >= self.margin))
 
     def slacks_near(self, grasp: Grasps) -> Slacks:
-        """The force-closure margin, less the margin asked for."""
+        """The force-closure margin, negative where internal forces leave the cones, less the margin asked for."""
 
         def slacks(grasps: Grasps) -> Array:
-            margins = np.asarray(_core.force_closure_margins(grasps.system, grasps.x, self.friction))
-            return margins[:, None] - self.margin
+            signed = np.asarray(_core.force_closure_slacks(grasps.system, grasps.x, self.friction))
+            return np.maximum(signed, -1.0)[:, None] - self.margin
 
         return slacks
 

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+
 #include "graspatlas/grasp/grasp_system.hpp"
 
 namespace graspatlas {
@@ -12,7 +15,8 @@ namespace graspatlas {
 ///   margin = max over f of  min over i of  (mu n_i . f_i - |f_i - (n_i . f_i) n_i|) / sqrt(1 + mu^2),
 ///
 /// the distance from the nearest cone's surface. It is a small second-order cone programme in the null space of G,
-/// which a barrier method solves with the cones as they are, not as pyramids.
+/// which a barrier method solves with the cones as they are, not as pyramids. Where all internal forces leave their
+/// cones the same maximum is negative, and says how far the best of them are outside.
 class ForceClosure {
  public:
   /// `friction` is mu > 0.
@@ -21,9 +25,27 @@ class ForceClosure {
   /// The margin at x; zero when the grasp is not force-closed.
   double margin(const double* x);
 
+  /// The margin at x with its sign; minus infinity when G has lost rank or internal forces cannot press at all.
+  double slack(const double* x);
+
  private:
-  bool internal_forces();
-  double widest_margin();
+  using Force = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;  // in the plane it has two components
+
+  /// |tangential z + tangential_0| <= axial . z + axial_0: a cone as a function of the unknowns z = (c, t).
+  struct Cone {
+    Matrix tangential;
+    Force tangential_0;
+    Vector axial;
+    double axial_0;
+
+    double evaluate(const Vector& z, Force& tangent, double& along) const;
+  };
+
+  bool internal_forces(const double* x);
+  void set_cones();
+  double widest_margin(bool signed_margin);
+  double barrier(const Vector& z, double weight) const;
+  bool newton_step(double weight);
 
   GraspSystem& system_;
   double friction_;
@@ -33,6 +55,14 @@ class ForceClosure {
   Matrix basis_;       // of the internal forces with no total normal force, one a column
   Vector particular_;  // internal forces with total normal force one
   std::vector<ContactPoint> points_;
+
+  // Room to work in, the same for all grasps.
+  Matrix equations_, Q_;
+  Eigen::ColPivHouseholderQR<Matrix> qr_;
+  std::vector<Cone> cones_;
+  Vector z_, next_, gradient_, step_, slope_;
+  Matrix hessian_;
+  Eigen::LDLT<Matrix> factor_;
 };
 
 }  // namespace graspatlas
