@@ -18,7 +18,7 @@ from graspatlas import _core
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.tables import number_array
 
-__all__ = ["Cone", "Cylinder", "Patch", "Plane", "Point", "Revolution", "patch_from_dict"]
+__all__ = ["Cone", "Cylinder", "Patch", "Plane", "Point", "Revolution", "patch_from_dict", "patch_types"]
 
 Array = NDArray[np.float64]
 Vector3 = tuple[float, float, float]
@@ -347,6 +347,11 @@ class Revolution(_Turned):
 
 
 _KINDS: dict[str, type[Patch]] = {c.kind: c for c in (Point, Plane, Cylinder, Cone, Revolution)}
+
+
+def patch_types() -> tuple[type[Patch], ...]:
+    """All types of patches."""
+    return tuple(_KINDS.values())
 
 
 def patch_from_dict(data: Mapping[str, Any]) -> Patch:
