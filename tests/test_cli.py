@@ -176,8 +176,8 @@ LINK = '<link name="palm"/>'
 LOOSE = f'<robot name="x">{LINK}<joint name="j" type="fixed"><parent link="palm"/><child link="gone"/></joint></robot>'
 # What is wrong with the problem file, and words that the message must have.
 PROBLEM_FILES = {
-    "empty": (lambda data, folder: "", ["JSON"]),
-    "broken JSON": (lambda data, folder: json.dumps(data)[:-20], ["JSON"]),
+    "empty": (lambda data, folder: "", ["empty"]),
+    "broken JSON": (lambda data, folder: json.dumps(data)[:-20], ["YAML"]),
     "a list": (lambda data, folder: "[]", ["problem"]),
     "null": (lambda data, folder: "null", ["problem"]),
     "no hand": (drop("hand"), ["hand"]),
@@ -216,7 +216,7 @@ PROBLEM_FILES = {
     "huge can": (put(1e300, "contacts", 0, "object", "radius"), ["x1", "mm"]),
     "motions of other joints": (put("little_dip", "hand_motions", "joints", 0), ["little_dip"]),
     "motions with NaN": (put(float("nan"), "hand_motions", "mean", 0), ["finite"]),
-    "motions of text": (put("a", "hand_motions", "mean", 0), ["hand motions"]),
+    "motions of text": (put("a", "hand_motions", "mean", 0), ["hand_motions"]),
     "short covariance": (put([[1.0]], "hand_motions", "covariance"), ["covariance"]),
     "default radius of text": (put("wide", "defaults", "radius"), ["radius", "wide"]),
     "default quality unknown": (put("beauty", "defaults", "quality"), ["beauty"]),

@@ -16,6 +16,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.optimize import brentq, minimize
@@ -80,8 +81,8 @@ class PlanarHand:
     @classmethod
     def read(cls) -> PlanarHand:
         """The constants, by ways of their own: no kinematics and no patch of the package is used."""
-        file = resources.files("graspatlas") / "problems" / "planar_hand.json"
-        data = json.loads(file.read_text(encoding="utf-8"))
+        file = resources.files("graspatlas") / "problems" / "planar_hand.yaml"
+        data = yaml.safe_load(file.read_text(encoding="utf-8"))
         urdf = (ga.hand.robots_folder() / data["hand"]["urdf"]).read_text(encoding="utf-8")
         joints, contacts = data["x1"]["joints"], data["contacts"]
         arcs = [contact["object"] for contact in contacts]

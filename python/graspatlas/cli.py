@@ -22,6 +22,7 @@ from graspatlas.files import replaced
 from graspatlas.optimizer import optimize
 from graspatlas.pareto import knee, pareto_front, values_of
 from graspatlas.paths import GraspPath, shortest_path
+from graspatlas.problem_commands import add_problem_commands
 from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.quality import INDICES, quality_name
 from graspatlas.requirements import REQUIREMENTS, parse_requirement
@@ -77,8 +78,10 @@ def _parser() -> argparse.ArgumentParser:
     listing = commands.add_parser("list", help="list the bundled problems, the quality indices and the requirements")
     listing.set_defaults(run=_list)
 
+    add_problem_commands(commands)
+
     best = commands.add_parser("optimize", help="trace all relevant grasps of a problem and find the best one")
-    best.add_argument("problem", help="name of a bundled problem, or path of a problem file (.json)")
+    best.add_argument("problem", help="name of a bundled problem, or path of a problem file (YAML)")
     best.add_argument("--dimension", type=int, metavar="K", help="dimension k of the set of relevant grasps")
     best.add_argument(
         "--radius",
@@ -104,7 +107,7 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         metavar="NAME[:VALUE...]",
         help="requirement that the best grasp must meet, such as collision_free, force_closure:0.5:0.02 (friction, "
-        "margin) or joint_margin:0.05; may be given several times",
+        "margin) or joint_margin:0.05; may be given several times; replaces those of the problem, 'none' drops them",
     )
     best.add_argument(
         "--refine",
@@ -216,7 +219,7 @@ def _list(_: argparse.Namespace) -> int:
 
 def _optimize(options: argparse.Namespace) -> int:
     problem = load_problem(options.problem)
-    require = [parse_requirement(text) for text in options.require]
+    require = [parse_requirement(text) for text in options.require if text != "none"] if options.require else None
     folder = writable_folder(options.output) if options.output else None
     names = ("dimension", "radius", "epsilon", "quality", "refine", "max_charts", "max_seconds")
     given = {name: getattr(options, name) for name in names}

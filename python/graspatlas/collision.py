@@ -166,7 +166,10 @@ def _shapes(body: Body, model: Any) -> Any:
 
 def _drop_adjacent(model: Any, geometry: Any) -> None:
     """Without an SRDF, shapes of one joint and of parent and child joints may touch."""
-    for pair in list(geometry.collisionPairs):
+    import pinocchio as pin
+
+    copies = [pin.CollisionPair(pair.first, pair.second) for pair in geometry.collisionPairs]  # removing moves them
+    for pair in copies:
         a, b = (geometry.geometryObjects[i].parentJoint for i in (pair.first, pair.second))
         if a == b or model.parents[a] == b or model.parents[b] == a:
             geometry.removeCollisionPair(pair)

@@ -131,7 +131,7 @@ def find_components(
     radius: float | None = None,
     epsilon: float | None = None,
     quality: Quality | Sequence[Quality] | None = None,
-    require: Sequence[Require] = (),
+    require: Sequence[Require] | None = None,
     refine: bool | str = False,
     max_charts: int | None = None,
     max_seconds: float | None = None,
@@ -149,7 +149,7 @@ def find_components(
         radius: r, of a chart: see :func:`graspatlas.optimize`; this and what follows hold for every component.
         epsilon: See :func:`graspatlas.build_atlas`.
         quality: Name of an index, or a callable; of several the first chooses.
-        require: What a grasp must meet to be the best or the worst.
+        require: What a grasp must meet to be the best or the worst; the problem's requirements by default.
         refine: Refine the best of each component; see :func:`graspatlas.optimize`.
         max_charts: Number of charts after which the atlas of a component is cut short; none by default.
         max_seconds: Time after which the search ends; none by default. An atlas that is growing then is cut short.

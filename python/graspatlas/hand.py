@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from importlib import resources
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -15,28 +14,13 @@ from numpy.typing import NDArray
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.robot_files import find_file, package_folders, robots_folder
 from graspatlas.tables import checked_table, numbers
+from graspatlas.urdf import joint_limits, lock_joints, moving_joints
 
 __all__ = ["Body", "Hand", "robots_folder"]
 
 Array = NDArray[np.float64]
-
-
-def robots_folder() -> Path:
-    """Folder of the hands and objects that come with the package."""
-    installed = Path(str(resources.files("graspatlas"))) / "robots"
-    return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / "robots"
-
-
-def _find(path: str | Path, folder: Path | None) -> Path:
-    """A file by its own path, beside `folder`, or among the robots of the package."""
-    wanted = Path(path)
-    places = [wanted] if wanted.is_absolute() else [(folder or Path()) / wanted, robots_folder() / wanted]
-    for place in places:
-        if place.is_file():
-            return place
-    looked = " and ".join(str(place) for place in places)
-    raise GraspAtlasError(f"file '{path}' does not exist; looked for it at {looked}")
 
 
 def _check_xml(name: str, text: str) -> None:
@@ -58,6 +42,7 @@ class Body:
         urdf_path: Where it was read, as stated.
         package_dirs: Folders in which ``package://`` paths of meshes are looked up.
         srdf: Text of an SRDF with pairs of links that may touch, or nothing.
+        package_paths: Those of these folders that the user named.
     """
 
     name: str
@@ -65,6 +50,7 @@ class Body:
     urdf_path: str = ""
     package_dirs: tuple[str, ...] = ()
     srdf: str = ""
+    package_paths: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         _check_xml(self.name, self.urdf)
@@ -76,19 +62,22 @@ class Body:
         name: str | None,
         srdf: str | Path | None,
         folder: Path | None,
+        package_paths: Sequence[str | Path] = (),
     ) -> dict[str, object]:
-        path = _find(urdf, folder)
+        stated = tuple(str((folder or Path()) / place) for place in package_paths)
+        path = find_file(urdf, folder, stated)
         try:
             text = path.read_text(encoding="utf-8")
-            srdf_text = _find(srdf, folder).read_text(encoding="utf-8") if srdf else ""
+            srdf_text = find_file(srdf, folder, stated).read_text(encoding="utf-8") if srdf else ""
         except (OSError, UnicodeDecodeError) as error:
             raise GraspAtlasError(f"cannot read '{urdf}': {error}") from None
         return {
             "name": name or path.stem,
             "urdf": text,
             "urdf_path": str(urdf),
-            "package_dirs": (str(path.parent), str(path.parent.parent), str(robots_folder())),
+            "package_dirs": package_folders(path, stated),
             "srdf": srdf_text,
+            "package_paths": stated,
         }
 
     @classmethod
@@ -99,41 +88,48 @@ class Body:
         name: str | None = None,
         srdf: str | Path | None = None,
         folder: Path | None = None,
+        package_paths: Sequence[str | Path] = (),
     ) -> Body:
         """Read a body from a URDF file.
 
         Args:
-            urdf: Path of the file; a relative one is looked up in `folder`, then in the robots of the package.
+            urdf: Path of the file; a relative one is looked up in `folder`, then in the robots of the package, and a
+                ``package://`` one in the package paths and in example-robot-data.
             name: Name to give it; the file's by default.
             srdf: Path of an SRDF file.
             folder: Where relative paths start; the current folder by default.
+            package_paths: Folders in which ``package://`` paths are looked up first.
 
         Raises:
             GraspAtlasError: If a file is missing or cannot be read.
         """
-        return cls(**cls._read(urdf, name, srdf, folder))  # type: ignore[arg-type]
+        return cls(**cls._read(urdf, name, srdf, folder, package_paths))  # type: ignore[arg-type]
 
     def to_dict(self) -> dict[str, Any]:
         """The body as plain data, with the text of its URDF."""
-        return {"name": self.name, "urdf": self.urdf_path, "urdf_text": self.urdf, "srdf_text": self.srdf}
+        table: dict[str, Any] = {"name": self.name, "urdf": self.urdf_path}
+        table |= {"urdf_text": self.urdf, "srdf_text": self.srdf}
+        return {**table, "package_paths": list(self.package_paths)} if self.package_paths else table
 
     @classmethod
     def _arguments(cls, data: Mapping[str, Any], folder: Path | None) -> dict[str, object]:
         """Arguments from a table: read from its URDF file, or from the text that a stored problem carries."""
-        table = checked_table(data, f"a {cls.__name__.lower()}", ("urdf",), ("name", "srdf", "urdf_text", "srdf_text"))
-        path, name = str(table["urdf"]), table.get("name")
+        optional = ("name", "srdf", "urdf_text", "srdf_text", "package_paths")
+        table = checked_table(data, f"a {cls.__name__.lower()}", ("urdf",), optional)
+        path, name, stated = str(table["urdf"]), table.get("name"), tuple(table.get("package_paths") or ())
         if not table.get("urdf_text"):
-            return cls._read(path, name, table.get("srdf"), folder)
+            return cls._read(path, name, table.get("srdf"), folder, stated)
         try:
-            package_dirs = cls._read(path, name, None, folder)["package_dirs"]
+            found: Path | None = find_file(path, folder, stated)
         except GraspAtlasError:
-            package_dirs = (str(robots_folder()),)
+            found = None
         return {
             "name": str(name),
             "urdf": str(table["urdf_text"]),
             "urdf_path": path,
-            "package_dirs": package_dirs,
+            "package_dirs": package_folders(found, stated),
             "srdf": str(table.get("srdf_text") or ""),
+            "package_paths": stated,
         }
 
     @classmethod
@@ -167,7 +163,7 @@ class Hand(Body):
                 raise unknown_name("joint", joint, self.joints, f"in hand '{self.name}'")
             if len(self.limits[joint]) != 2 or not self.limits[joint][0] < self.limits[joint][1]:
                 raise GraspAtlasError(f"limits of joint '{joint}' must be (lower, upper), got {self.limits[joint]}")
-        for info in self.model.hand_joints:
+        for info in self.model.hand_joints if self.limits else ():
             if info.name in self.limits and info.q_size != 1:
                 raise GraspAtlasError(f"joint '{info.name}' is continuous and has no limits; make it revolute")
 
@@ -179,10 +175,48 @@ class Hand(Body):
         name: str | None = None,
         srdf: str | Path | None = None,
         folder: Path | None = None,
+        package_paths: Sequence[str | Path] = (),
         limits: dict[str, tuple[float, float]] | None = None,
     ) -> Hand:
         """Read a hand from a URDF file; see :meth:`Body.from_urdf`."""
-        return cls(**cls._read(urdf, name, srdf, folder), limits=dict(limits or {}))  # type: ignore[arg-type]
+        read = cls._read(urdf, name, srdf, folder, package_paths)
+        return cls(**read, limits=dict(limits or {}))  # type: ignore[arg-type]
+
+    def with_joints(self, moving: Sequence[str] | None = None, locked: Mapping[str, float] | None = None) -> Hand:
+        """The hand with only some joints moving, the others locked.
+
+        Args:
+            moving: Names of the joints that move; by default all that are not locked.
+            locked: Positions of the joints that do not [rad or m]; 0 where nothing is said.
+
+        Raises:
+            GraspAtlasError: If there is no such joint, a joint is both, or a position lies outside its limits.
+        """
+        names, positions = moving_joints(self.urdf), dict(locked or {})
+        for name in [*(moving or ()), *positions]:
+            if name not in names:
+                raise unknown_name("joint", name, names, f"one of hand '{self.name}' that moves")
+        for name in moving or ():
+            if name in positions:
+                raise GraspAtlasError(f"joint '{name}' is among the joints that move and among the locked ones")
+        if moving is not None:
+            positions = {name: positions.get(name, 0.0) for name in names if name not in moving}
+        if not positions:
+            return self
+        limits = {name: pair for name, pair in self.limits.items() if name not in positions}
+        return replace(self, urdf=lock_joints(self.urdf, positions), limits=limits)
+
+    def with_limits_enlarged(self, by: float) -> Hand:
+        """The hand with all limits of its revolute joints wider, those in ``limits`` as they are.
+
+        Args:
+            by: What is added at both ends [rad]; negative to make them narrower.
+
+        Raises:
+            GraspAtlasError: If a joint is left without a range.
+        """
+        wider = {name: (lower - by, upper + by) for name, (lower, upper) in joint_limits(self.urdf).items()}
+        return replace(self, limits={**wider, **self.limits})
 
     def to_dict(self) -> dict[str, Any]:
         """The hand as plain data, with the text of its URDF."""

@@ -124,7 +124,7 @@ def optimize(
     radius: float | None = None,
     epsilon: float | None = None,
     quality: Quality | Sequence[Quality] | None = None,
-    require: Sequence[Require] = (),
+    require: Sequence[Require] | None = None,
     refine: bool | str = False,
     max_charts: int | None = None,
     max_seconds: float | None = None,
@@ -142,7 +142,8 @@ def optimize(
         epsilon: See :func:`build_atlas`.
         quality: Name of an index, or a callable: see :mod:`graspatlas.quality`. Of several, the first chooses the best,
             and the others are kept in ``result.others``.
-        require: What a grasp must meet to be the best or the worst: see :mod:`graspatlas.requirements`.
+        require: What a grasp must meet to be the best or the worst: see :mod:`graspatlas.requirements`. Those of the
+            problem by default; ``()`` for none.
         refine: Climb from the best charts to the maximum between the charts' centres, ``result.refined_best``: in R
             with True or ``"relevant"``, then on in all dimensions of F with ``"feasible"``; see :func:`refine`.
         max_charts: See :func:`build_atlas`.
@@ -176,6 +177,7 @@ def optimize(
     )
     start = time.perf_counter()
     grasps = Grasps(problem, atlas.centers, system)
+    require = problem.requirements if require is None else require
     feasible, refused = screen(require, grasps)
     qualities = evaluate(first, grasps)
     values = {quality_name(other): evaluate(other, grasps) for other in others}

@@ -19,6 +19,7 @@ from graspatlas.first_grasp import FirstGrasp, first_grasp_from_array, first_gra
 from graspatlas.hand import Body, Hand
 from graspatlas.motions import HandMotions
 from graspatlas.patches import Patch
+from graspatlas.requirements import Requirement, requirement_from_dict
 from graspatlas.tables import checked_table, number, number_array
 
 __all__ = ["Problem"]
@@ -56,6 +57,7 @@ class Problem:
         object_joint: How the object moves: ``"free_flyer"``, or ``"planar"`` for problems in the palm's x-y plane.
         length_scale: Length that counts as much as one radian [m].
         defaults: ``dimension``, ``radius``, ``epsilon`` and ``quality`` to use when the caller names none.
+        requirements: What the best grasp must meet when the caller does not say.
         description, source: For people.
 
     Raises:
@@ -72,11 +74,13 @@ class Problem:
     object_joint: str = "free_flyer"
     length_scale: float = 0.01
     defaults: Mapping[str, Any] = field(default_factory=dict)
+    requirements: tuple[Requirement, ...] = ()
     description: str = ""
     source: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "contacts", tuple(self.contacts))
+        object.__setattr__(self, "requirements", tuple(self.requirements))
         if not self.contacts:
             raise GraspAtlasError(f"problem '{self.name}' has no contact")
         if not (np.isfinite(self.length_scale) and self.length_scale > 0.0):
@@ -216,6 +220,8 @@ class Problem:
             raise GraspAtlasError(
                 f"dimension {dimension} would freeze {s} hand motions, all that hand '{self.hand.name}' has"
             )
+        if self.motions is not None:
+            self.motions.check_frozen(s)
         return s
 
     def system(self, dimension: int) -> _core.GraspSystem:
@@ -340,7 +346,7 @@ class Problem:
 
     def to_dict(self) -> dict[str, Any]:
         """The problem as plain data that :meth:`from_dict` reads, with the text of its URDFs."""
-        table = {
+        table: dict[str, Any] = {
             "name": self.name,
             "description": self.description,
             "source": self.source,
@@ -352,7 +358,11 @@ class Problem:
             "x1": self.x1.to_dict() if self.x1 is not None else None,
             "defaults": dict(self.defaults),
         }
-        return table if self.reference is None else {**table, "reference": dict(self.reference)}
+        if self.requirements:
+            table["requirements"] = [requirement.to_dict() for requirement in self.requirements]
+        if self.reference is not None:
+            table["reference"] = dict(self.reference)
+        return table
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], folder: Path | None = None) -> Problem:
@@ -365,7 +375,16 @@ class Problem:
         Raises:
             GraspAtlasError: If something is missing or wrong.
         """
-        optional = ("description", "source", "length_scale", "hand_motions", "defaults", "x1", "reference")
+        optional = (
+            "description",
+            "source",
+            "length_scale",
+            "hand_motions",
+            "defaults",
+            "requirements",
+            "x1",
+            "reference",
+        )
         table = checked_table(data, "the problem", ("name", "hand", "object", "contacts"), optional)
         body = dict(checked_table(table["object"], "the object", ("urdf",), None))
         object_joint = str(body.pop("joint", "free_flyer"))
@@ -383,6 +402,7 @@ class Problem:
             motions=HandMotions.from_dict(motions) if motions else None,
             length_scale=number(table.get("length_scale", 0.01), "length_scale"),
             defaults=dict(checked_table(table.get("defaults") or {}, "defaults", (), DEFAULTS)),
+            requirements=tuple(map(requirement_from_dict, table.get("requirements") or ())),
             description=str(table.get("description", "")),
             source=str(table.get("source", "")),
         )

@@ -6,8 +6,8 @@ whole batch of :class:`~graspatlas.grasps.Grasps` and returns an array [n] is ma
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, astuple, dataclass, fields
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -18,6 +18,7 @@ from graspatlas import _core
 from graspatlas.collision import CollisionChecker
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.grasps import Grasps
+from graspatlas.tables import checked_table
 
 if TYPE_CHECKING:
     from graspatlas.problem import Problem
@@ -28,7 +29,9 @@ __all__ = [
     "ForceClosure",
     "JointMargin",
     "Require",
+    "Requirement",
     "parse_requirement",
+    "requirement_from_dict",
     "requirement_name",
     "screen",
 ]
@@ -72,6 +75,10 @@ class Requirement:
 
     def __str__(self) -> str:
         return ":".join([self.name, *(f"{value:g}" for value in astuple(self))])
+
+    def to_dict(self) -> dict[str, dict[str, float]]:
+        """The requirement as plain data: its values under its name."""
+        return {self.name: asdict(self)}
 
     def _check(self, positive: Sequence[str], finite: Sequence[str] = ()) -> None:
         for attribute in (*positive, *finite):
@@ -219,6 +226,24 @@ def parse_requirement(text: str) -> Requirement:
         raise GraspAtlasError(
             f"requirement '{text}' holds a value that is no number; it is {name}:{':'.join(attributes)}"
         ) from None
+
+
+def requirement_from_dict(data: Mapping[str, Any]) -> Requirement:
+    """The requirement that :meth:`Requirement.to_dict` described.
+
+    Args:
+        data: Its values by attribute, or nothing, under its name: ``{"force_closure": {"friction": 0.5}}``.
+
+    Raises:
+        GraspAtlasError: If there is no such requirement or attribute, or a value is wrong.
+    """
+    if not isinstance(data, Mapping) or len(data) != 1:
+        raise GraspAtlasError(f"a requirement is a table of one name and its values, got {data!r}")
+    ((name, values),) = data.items()
+    if name not in REQUIREMENTS:
+        raise unknown_name("requirement", name, REQUIREMENTS)
+    attributes = [field.name for field in fields(REQUIREMENTS[name])]
+    return REQUIREMENTS[name](**checked_table(values or {}, f"requirement {name}", (), attributes))
 
 
 def screen(requirements: Sequence[Require], grasps: Grasps) -> tuple[Flags, dict[str, int]]:

@@ -168,7 +168,8 @@ def run_sweep(
         radii: Radii r of a chart to combine.
         epsilons: Values of epsilon to combine.
         qualities: Names of indices to combine.
-        require: Requirements of every run, as texts such as ``"force_closure:0.5:0.02"``.
+        require: Requirements of every run, as texts such as ``"force_closure:0.5:0.02"``; each problem's own by
+            default.
         refine: Go on from the best charts to the maximum between them; ``quality_best`` is then the refined one.
         max_charts: Limit of every run.
         max_seconds: Limit of every run.
@@ -290,7 +291,7 @@ def _solve(run: Run) -> dict[str, Any]:
             radius=run.radius,
             epsilon=run.epsilon,
             quality=run.quality,
-            require=[parse_requirement(text) for text in run.require],
+            require=[parse_requirement(text) for text in run.require] if run.require else None,
             refine=run.refine,
             max_charts=run.max_charts,
             max_seconds=run.max_seconds,

@@ -8,7 +8,7 @@ from graspatlas.patches.base import Patch
 from graspatlas.patches.curve import Curve
 from graspatlas.patches.flat import Plane, Point
 from graspatlas.patches.mesh_fit import FitReport, patch_from_mesh
-from graspatlas.patches.registry import patch_from_dict
+from graspatlas.patches.registry import patch_from_dict, patch_types
 from graspatlas.patches.round import Ellipsoid, Sphere, Torus
 from graspatlas.patches.spline import Bezier, BSpline
 from graspatlas.patches.turned import Cone, Cylinder, Revolution
@@ -29,4 +29,5 @@ __all__ = [
     "Torus",
     "patch_from_dict",
     "patch_from_mesh",
+    "patch_types",
 ]

@@ -14,10 +14,27 @@ from graspatlas.patches.round import Ellipsoid, Sphere, Torus
 from graspatlas.patches.spline import Bezier, BSpline
 from graspatlas.patches.turned import Cone, Cylinder, Revolution
 
-__all__ = ["patch_from_dict"]
+__all__ = ["patch_from_dict", "patch_types"]
 
-_CLASSES = (Point, Plane, Cylinder, Cone, Revolution, Sphere, Torus, Ellipsoid, Bezier, BSpline, Curve)
+_CLASSES: tuple[type[Patch], ...] = (
+    Point,
+    Plane,
+    Cylinder,
+    Cone,
+    Revolution,
+    Sphere,
+    Torus,
+    Ellipsoid,
+    Bezier,
+    BSpline,
+    Curve,
+)
 _KINDS: dict[str, type[Patch]] = {c.kind: c for c in _CLASSES}
+
+
+def patch_types() -> tuple[type[Patch], ...]:
+    """All types of patches."""
+    return _CLASSES
 
 
 def patch_from_dict(data: Mapping[str, Any]) -> Patch:

@@ -1,50 +1,57 @@
-"""The bundled problems, and problem files of your own: JSON tables like those of `graspatlas.Problem.to_dict`."""
+"""The bundled problems, and problem files of your own."""
 
 from __future__ import annotations
 
-import json
 from importlib import resources
 from pathlib import Path
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.problem import Problem
+from graspatlas.robot_files import robots_folder
 
-__all__ = ["bundled_problems", "load_problem"]
+__all__ = ["bundled_problems", "load_problem", "problem_text"]
+
+#: Endings of problem files; JSON is a part of YAML.
+ENDINGS = (".yaml", ".yml", ".json")
 
 
 def bundled_problems() -> list[str]:
     """Names of the problems that come with the package."""
     folder = resources.files("graspatlas.problems")
-    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".json"))
+    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".yaml"))
 
 
 def load_problem(name: str | Path) -> Problem:
-    """Load a problem by its bundled name, or from a problem file (JSON).
+    """Load a problem by its bundled name, or from a problem file.
 
     Args:
-        name: Such as ``"schunk_can"``, or a path that ends in ``.json``.
+        name: Such as ``"schunk_can"``, or the path of a YAML or JSON file; see ``docs/problem_files.md``.
 
     Raises:
-        GraspAtlasError: If there is no such problem, or its file is damaged or wrong.
+        GraspAtlasError: If there is no such problem, or its file is wrong: the message names line and field.
     """
-    folder: Path | None = None
+    from graspatlas.problem_files import read_problem  # slow to import
+
+    return read_problem(*problem_text(name))
+
+
+def problem_text(name: str | Path) -> tuple[str, str, Path]:
+    """Text of a problem file, its name, and the folder where its relative paths start.
+
+    Args:
+        name: A bundled name or a path.
+
+    Raises:
+        GraspAtlasError: If there is no such problem, or its file cannot be read.
+    """
     if str(name) in bundled_problems():
-        text = (resources.files("graspatlas.problems") / f"{name}.json").read_text(encoding="utf-8")
-    else:
-        path = Path(name)
-        if path.suffix != ".json" and not path.is_file():
-            raise unknown_name("problem", name, bundled_problems())
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise GraspAtlasError(f"cannot read problem file '{path}': {reason}; correct the path") from None
-        folder = path.parent
+        text = (resources.files("graspatlas.problems") / f"{name}.yaml").read_text(encoding="utf-8")
+        return text, f"{name}.yaml", robots_folder()
+    path = Path(name)
+    if path.suffix not in ENDINGS and not path.is_file():
+        raise unknown_name("problem", name, bundled_problems())
     try:
-        data = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise GraspAtlasError(f"problem file '{name}' is not JSON: {error}") from None
-    try:
-        return Problem.from_dict(data, folder)
-    except GraspAtlasError as error:
-        raise GraspAtlasError(f"problem file '{name}': {error}") from None
+        return path.read_text(encoding="utf-8"), str(name), path.parent
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise GraspAtlasError(f"cannot read problem file '{path}': {reason}; correct the path") from None

@@ -1,0 +1,192 @@
+"""From a problem file to a problem."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from graspatlas.contacts import Contact
+from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.hand import Body, Hand
+from graspatlas.motions import HandMotions, coupling_rows
+from graspatlas.patches import patch_from_dict
+from graspatlas.problem import Problem
+from graspatlas.problem_files import documents
+from graspatlas.problem_files.faults import ProblemFileError, faults_of_validation, narrowed, one_line
+from graspatlas.problem_files.postures import read_postures
+from graspatlas.problem_files.schema import HandTable, MotionsTable, ObjectTable, ProblemTable
+from graspatlas.requirements import requirement_from_dict
+from graspatlas.robot_files import described_robot, example_robot, find_file
+from graspatlas.urdf import box_urdf, cylinder_urdf, mesh_urdf, moving_joints, sphere_urdf
+
+__all__ = ["FILL_IN", "read_problem"]
+
+#: What stands in a template where the user has to fill in something.
+FILL_IN = "FILL_IN"
+
+
+def read_problem(text: str, file: str = "problem.yaml", folder: Path | None = None) -> Problem:
+    """The problem that the text of a problem file states.
+
+    Args:
+        text: YAML, of which JSON is a part; see ``docs/problem_files.md``.
+        file: The file's name, for messages and as the problem's name when it states none.
+        folder: Where relative paths start; the current folder by default.
+
+    Raises:
+        ProblemFileError: If anything is wrong: file, line, field, what came and what is allowed.
+    """
+    try:
+        document = documents.parse(text)
+    except documents.DocumentError as error:
+        raise ProblemFileError([f"{file}:{error.line}: {error}"]) from None
+    _check_filled_in(file, document)
+    try:
+        table = ProblemTable.model_validate(document.data)
+    except ValidationError as error:
+        raise ProblemFileError(faults_of_validation(file, document, error)) from None
+    return _Reading(file, document, folder).problem(table)
+
+
+def _check_filled_in(file: str, document: documents.Document) -> None:
+    """Name what a template leaves to the user."""
+    blanks = [path for path in document.lines if _at(document.data, path) == FILL_IN]
+    if blanks:
+        message = "is still to be filled in; the comment beside it says with what"
+        raise ProblemFileError([one_line(file, document, path, message) for path in blanks])
+
+
+def _at(data: Any, path: documents.Path) -> Any:
+    for key in path:
+        data = data[key]
+    return data
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """A file that agrees with the schema, on its way to a problem."""
+
+    file: str
+    document: documents.Document
+    folder: Path | None
+
+    @contextmanager
+    def _within(self, *path: str | int) -> Iterator[None]:
+        """Errors in this block are about this field, or one inside it."""
+        try:
+            yield
+        except ProblemFileError:
+            raise
+        except GraspAtlasError as error:
+            inner, message = narrowed(self.document, path, str(error))
+            raise ProblemFileError([one_line(self.file, self.document, inner, message)]) from None
+
+    def problem(self, table: ProblemTable) -> Problem:
+        """The problem itself."""
+        stated = self.document.data
+        with self._within("hand"):
+            full = self._whole_hand(table.hand)
+            hand = full.with_joints(table.hand.joints, table.hand.locked)
+            if table.hand.enlarge_limits:
+                hand = hand.with_limits_enlarged(table.hand.enlarge_limits)
+            joints = hand.joints
+        with self._within("object"):
+            body = self._object(table.object)
+        for i, contact in enumerate(stated["contacts"]):
+            for side in ("hand", "object"):
+                with self._within("contacts", i, side):
+                    patch_from_dict(contact[side])
+            with self._within("contacts", i):
+                hand.frame(Contact.from_dict(contact).frame)
+        plain: dict[str, Any] = {
+            "name": table.name or Path(self.file).stem,
+            "description": table.description,
+            "source": table.source,
+            "hand": hand.to_dict(),
+            "object": {**body.to_dict(), "joint": table.object.joint},
+            "contacts": stated["contacts"],
+            "length_scale": table.length_scale,
+            "defaults": table.defaults.model_dump(exclude_none=True),
+        }
+        if table.hand_motions is not None:
+            with self._within("hand_motions"):
+                motions = self._motions(table.hand_motions, joints, moving_joints(full.urdf))
+                plain["hand_motions"] = motions.to_dict()
+        for i, requirement in enumerate(table.requirements):
+            with self._within("requirements", i):
+                stated_requirement = requirement.model_dump(exclude_none=True)
+                requirement_from_dict(stated_requirement)
+                plain.setdefault("requirements", []).append(stated_requirement)
+        plain |= {name: stated[name] for name in ("x1", "reference") if stated.get(name) is not None}
+        with self._within():
+            return Problem.from_dict(plain, self.folder)
+
+    def _whole_hand(self, table: HandTable) -> Hand:
+        """The hand as its URDF has it, with the limits that are stated."""
+        plain = table.model_dump(
+            include={"name", "urdf", "srdf", "urdf_text", "srdf_text", "package_paths", "limits"}, exclude_none=True
+        )
+        if table.example_robot_data is not None:
+            with self._within("hand", "example_robot_data"):
+                plain["urdf"] = example_robot(table.example_robot_data)
+        if table.robot_descriptions is not None:
+            with self._within("hand", "robot_descriptions"):
+                plain["urdf"], folders = described_robot(table.robot_descriptions)
+            plain["package_paths"] = [*folders, *table.package_paths]
+        return Hand.from_dict(plain, self.folder)
+
+    def _object(self, table: ObjectTable) -> Body:
+        name = table.name
+        if table.sphere is not None:
+            return Body(name or "sphere", sphere_urdf(name or "sphere", table.sphere.radius))
+        if table.box is not None:
+            return Body(name or "box", box_urdf(name or "box", table.box.size))
+        if table.cylinder is not None:
+            urdf = cylinder_urdf(name or "cylinder", table.cylinder.radius, table.cylinder.length)
+            return Body(name or "cylinder", urdf)
+        if table.mesh is not None:
+            return self._mesh(table.mesh, table)
+        plain = table.model_dump(
+            include={"name", "urdf", "srdf", "urdf_text", "srdf_text", "package_paths"}, exclude_none=True
+        )
+        return Body.from_dict(plain, self.folder)
+
+    def _mesh(self, mesh: str, table: ObjectTable) -> Body:
+        path = find_file(mesh, self.folder, tuple(table.package_paths)).resolve()
+        name, scale = table.name or path.stem, table.scale
+        scales = scale if isinstance(scale, list) else [1.0 if scale is None else scale] * 3
+        folder = str(path.parent.parent)
+        urdf = mesh_urdf(name, f"package://{path.parent.name}/{path.name}", scales)
+        return Body(name, urdf, package_dirs=(folder,), package_paths=(folder,))
+
+    def _motions(self, table: MotionsTable, joints: tuple[str, ...], known: tuple[str, ...]) -> HandMotions:
+        """Hand motions of the joints that move; what is said of locked ones is left out."""
+        if table.samples is None and table.mean is None and table.covariance is None and table.couplings:
+            return HandMotions.from_couplings(table.couplings, joints)
+        motions = self._statistics(table, joints)
+        for name in motions.joints:
+            if name not in known:
+                raise unknown_name("joint", name, known, "one of the hand's that move")
+        for name in joints:
+            if name not in motions.joints:
+                raise GraspAtlasError(f"say nothing of joint '{name}', which moves: add it, or lock it under hand")
+        if len(motions.joints) > len(joints):
+            motions = motions.reordered([name for name in motions.joints if name in joints])
+        return replace(motions, couplings=coupling_rows(table.couplings, motions.joints))
+
+    def _statistics(self, table: MotionsTable, joints: tuple[str, ...]) -> HandMotions:
+        """Mean and covariance, stated or from samples."""
+        if table.samples is not None:
+            if table.mean is not None or table.covariance is not None:
+                raise GraspAtlasError("samples already give mean and covariance: drop these")
+            samples, names = read_postures(find_file(table.samples, self.folder), table.samples)
+            return HandMotions.from_samples(samples, names)
+        if table.mean is None or table.covariance is None:
+            raise GraspAtlasError("need samples, or mean and covariance, or couplings")
+        return HandMotions(tuple(table.joints or joints), np.array(table.mean), np.array(table.covariance))

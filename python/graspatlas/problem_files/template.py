@@ -1,0 +1,169 @@
+"""A problem file to start from: what is known of a hand filled in, what only the user knows marked."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from graspatlas.errors import GraspAtlasError
+from graspatlas.hand import Hand
+from graspatlas.patches import patch_types
+from graspatlas.problem_files.reading import FILL_IN
+from graspatlas.robot_files import described_robot, example_robot, find_file
+
+__all__ = ["problem_template"]
+
+_HEAD = """\
+# yaml-language-server: $schema=problem.schema.json
+# (graspatlas schema --output problem.schema.json writes it; editors then complete and check this file)
+#
+# Fill in what says {blank}; graspatlas check names what is left. Lengths are in metres, angles in radians.
+name: {name}
+description: ""
+
+hand:
+  {source}
+  # srdf: my_hand.srdf # pairs of links that may touch one another
+  # joints: [...] # only these move; or lock some, at these positions:
+  # locked: {{{first}: 0.0}}
+  # enlarge_limits: 0.0
+  # Joints and their limits:
+{joints}
+  # Frames that a contact can sit on:
+{frames}
+
+{object}
+
+# A contact: a patch of the hand touches a patch of the object, and their normals oppose.
+contacts:
+{contacts}
+"""
+
+_CONTACT = """\
+  - frame: {blank} # one of the frames above
+    hand:
+      type: point
+      position: {blank} # [x, y, z] in that frame
+      normal: {blank} # [x, y, z], out of the finger
+    object:
+      type: {blank} # {kinds}; then its fields, such as radius and axis of a cylinder
+    # frozen: {{u: 0.0, v: 0.0}} # parameters of the object's patch that stay
+"""
+
+_TAIL = """
+# Hand motions, of which the least important are frozen so that k dimensions stay: recorded postures, or couplings.
+# hand_motions:
+#   samples: postures.csv # joint names in the first row
+#   couplings:
+#     - {{{first}: 1, {second}: -0.7}} # this sum keeps its value
+
+# A first grasp. Positions here are in the middle of the limits.
+# x1:
+#   joints:
+{posture}
+#   object_xyz: [0, 0, 0.1] # in the palm's frame
+#   object_quat_xyzw: [0, 0, 0, 1]
+
+length_scale: 0.01 # a shift of this length counts as much as a turn of one radian
+
+defaults:
+  dimension: 2 # k
+  radius: 0.2 # r, of a chart [rad, and lengths / length_scale]; halve it until the best grasp no longer changes
+  epsilon: 0.5
+  quality: manipulability_volume
+
+requirements:
+  - force_closure: {{friction: 0.5, margin: 0.02}}
+  - collision_free
+"""
+
+
+def problem_template(urdf: str, object_file: str | None = None, *, folder: Path | None = None) -> str:
+    """Text of a problem file for a hand, with joints and frames listed and ``FILL_IN`` where the user must decide.
+
+    Args:
+        urdf: Path of the hand's URDF, or ``example_robot_data:NAME`` or ``robot_descriptions:NAME``.
+        object_file: Path of a URDF or a mesh of the object.
+        folder: Where the file will be, so that paths are stated relative to it.
+
+    Raises:
+        GraspAtlasError: If the hand cannot be read.
+    """
+    hand, source = _hand(urdf, folder)
+    joints = list(hand.joints)
+    head = _HEAD.format(
+        blank=FILL_IN,
+        name=f"my_{hand.name}",
+        source=source,
+        first=joints[0],
+        joints="\n".join(_joint_lines(hand)),
+        frames="\n".join(f"  #   {line}" for line in _rows(hand.frames)),
+        object=_object(object_file, folder),
+        contacts="\n".join([_contact()] * 3).rstrip("\n"),
+    )
+    posture = "\n".join(f"#     {name}: {value:.4g}" for name, value in zip(joints, _middle(hand), strict=True))
+    return head + _TAIL.format(first=joints[0], second=joints[-1], posture=posture)
+
+
+def _contact() -> str:
+    return _CONTACT.format(blank=FILL_IN, kinds=", ".join(cls.kind for cls in patch_types()))
+
+
+def _hand(urdf: str, folder: Path | None) -> tuple[Hand, str]:
+    """The hand, and the line of the file that names it."""
+    kind, _, name = urdf.partition(":")
+    if kind == "example_robot_data" and name:
+        return Hand.from_urdf(example_robot(name), name=name), f"example_robot_data: {name}"
+    if kind == "robot_descriptions" and name:
+        path, folders = described_robot(name)
+        return Hand.from_urdf(path, name=name, package_paths=folders), f"robot_descriptions: {name}"
+    if not Path(urdf).is_file():
+        raise GraspAtlasError(f"file '{urdf}' does not exist; give a URDF, or example_robot_data:NAME")
+    return Hand.from_urdf(Path(urdf).resolve()), f"urdf: {_relative(urdf, folder)}"
+
+
+def _relative(path: str, folder: Path | None) -> str:
+    return os.path.relpath(find_file(path, Path()), folder or Path())
+
+
+def _object(path: str | None, folder: Path | None) -> str:
+    if path is None:
+        return (
+            "# The object: one of urdf, mesh, sphere, box and cylinder (along z).\n"
+            f"object:\n  urdf: {FILL_IN} # path of a URDF; or instead\n"
+            "  # mesh: my_object.stl\n  # scale: 0.001 # from millimetres\n"
+            "  # cylinder: {radius: 0.03, length: 0.1}"
+        )
+    if path.endswith(".urdf"):
+        return f"object:\n  urdf: {_relative(path, folder)}"
+    return f"object:\n  mesh: {_relative(path, folder)}\n  scale: 1.0 # from the mesh's unit to metres"
+
+
+def _joint_lines(hand: Hand) -> list[str]:
+    lower, upper = hand.joint_limits
+    width = max(map(len, hand.joints))
+    return [
+        f"  #   {joint.name:{width}}  [{lower[joint.q_index]:.4g}, {upper[joint.q_index]:.4g}]"
+        for joint in hand.model.hand_joints
+    ]
+
+
+def _middle(hand: Hand) -> list[float]:
+    """The middle of each joint's limits, 0 where there are none."""
+    lower, upper = hand.joint_limits
+    middle = np.where(np.isfinite(lower) & np.isfinite(upper), 0.5 * (lower + upper), 0.0)
+    return [float(middle[joint.q_index]) for joint in hand.model.hand_joints]
+
+
+def _rows(names: Iterable[str], width: int = 100) -> list[str]:
+    """Names in lines of about this many characters."""
+    rows, row = [], ""
+    for name in names:
+        if row and len(row) + len(name) > width:
+            rows.append(row + ",")
+            row = ""
+        row += (", " if row else "") + name
+    return [*rows, row]

@@ -1,0 +1,134 @@
+"""Edits and texts of URDF: joints locked at a position, and bodies of one primitive or one mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from xml.etree import ElementTree
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from graspatlas.errors import GraspAtlasError, unknown_name
+
+__all__ = ["box_urdf", "cylinder_urdf", "joint_limits", "lock_joints", "mesh_urdf", "moving_joints", "sphere_urdf"]
+
+Array = NDArray[np.float64]
+#: Joints that move with one degree of freedom.
+TURNING, SLIDING = ("revolute", "continuous"), ("prismatic",)
+
+
+def moving_joints(urdf: str) -> tuple[str, ...]:
+    """Names of the joints that are not fixed, in the order of the text.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    return tuple(str(joint.get("name")) for joint in _joints(ElementTree.fromstring(urdf)))
+
+
+def joint_limits(urdf: str) -> dict[str, tuple[float, float]]:
+    """Limits (lower, upper) of the revolute joints of a URDF [rad], by name.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    limits = {}
+    for joint in _joints(ElementTree.fromstring(urdf)):
+        limit = joint.find("limit")
+        if joint.get("type") == "revolute" and limit is not None:
+            limits[str(joint.get("name"))] = (float(limit.get("lower", "0")), float(limit.get("upper", "0")))
+    return limits
+
+
+def lock_joints(urdf: str, positions: Mapping[str, float]) -> str:
+    """The URDF with some joints fixed where they stand at given positions.
+
+    Args:
+        urdf: Text of a URDF.
+        positions: Positions of the joints to lock, by name [rad or m].
+
+    Raises:
+        GraspAtlasError: If there is no such joint that moves, or a position lies outside its limits.
+    """
+    root = ElementTree.fromstring(urdf)
+    joints = {str(joint.get("name")): joint for joint in _joints(root)}
+    for name, position in positions.items():
+        if name not in joints:
+            raise unknown_name("joint", name, joints, "one that moves")
+        _lock(joints[name], float(position))
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _joints(root: ElementTree.Element) -> Iterable[ElementTree.Element]:
+    return [joint for joint in root.findall("joint") if joint.get("type") != "fixed"]
+
+
+def _lock(joint: ElementTree.Element, position: float) -> None:
+    """Makes a joint fixed; its origin takes up the motion."""
+    name, kind = joint.get("name"), joint.get("type")
+    if kind not in TURNING + SLIDING:
+        raise GraspAtlasError(f"joint '{name}' is {kind} and cannot be locked at one number")
+    limit = joint.find("limit")
+    if limit is not None and kind != "continuous":
+        lower, upper = float(limit.get("lower", "0")), float(limit.get("upper", "0"))
+        if not lower <= position <= upper:
+            limits = f"[{lower:g}, {upper:g}]"
+            raise GraspAtlasError(f"joint '{name}' is locked at {position:g}, outside its limits {limits}")
+    origin = joint.find("origin")
+    if origin is None:
+        origin = ElementTree.SubElement(joint, "origin")
+    xyz, rpy = _triple(origin.get("xyz"), (0, 0, 0)), _triple(origin.get("rpy"), (0, 0, 0))
+    element = joint.find("axis")
+    axis = _triple(None if element is None else element.get("xyz"), (1, 0, 0))
+    axis = axis / max(float(np.linalg.norm(axis)), np.finfo(float).tiny)
+    rotation = Rotation.from_euler("xyz", rpy)
+    if kind in TURNING:
+        turned = rotation * Rotation.from_rotvec(position * axis)
+        rpy = turned.as_euler("xyz", suppress_warnings=True)
+    else:
+        xyz = xyz + rotation.apply(position * axis)
+    origin.set("xyz", _words(xyz))
+    origin.set("rpy", _words(rpy))
+    joint.set("type", "fixed")
+    for tag in ("axis", "limit", "mimic", "dynamics", "safety_controller", "calibration"):
+        for child in joint.findall(tag):
+            joint.remove(child)
+
+
+def _triple(text: str | None, default: Sequence[float]) -> Array:
+    return np.array(default if text is None else [float(word) for word in text.split()], float)
+
+
+def _words(values: Iterable[float]) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def sphere_urdf(name: str, radius: float) -> str:
+    """URDF of a sphere about the origin; `radius` in metres."""
+    return _one_link(name, f'<sphere radius="{radius!r}"/>')
+
+
+def box_urdf(name: str, size: Iterable[float]) -> str:
+    """URDF of a box about the origin; `size` [3] are its edges along x, y and z [m]."""
+    return _one_link(name, f'<box size="{_words(size)}"/>')
+
+
+def cylinder_urdf(name: str, radius: float, length: float) -> str:
+    """URDF of a cylinder about the origin, its axis along z; `radius` and `length` in metres."""
+    return _one_link(name, f'<cylinder radius="{radius!r}" length="{length!r}"/>')
+
+
+def mesh_urdf(name: str, filename: str, scale: Iterable[float]) -> str:
+    """URDF of a mesh; `filename` as URDFs name them, `scale` [3] from the mesh's unit to metres."""
+    return _one_link(name, f'<mesh filename={quoteattr(filename)} scale="{_words(scale)}"/>')
+
+
+def _one_link(name: str, shape: str) -> str:
+    """One link, seen and touched as one shape."""
+    geometry = f"<geometry>{shape}</geometry>"
+    return (
+        f'<robot name={quoteattr(name)}><link name={quoteattr(name)}><visual>{geometry}<material name="grey">'
+        f'<color rgba="0.72 0.74 0.78 1"/></material></visual><collision>{geometry}</collision></link></robot>'
+    )

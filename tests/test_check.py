@@ -1,0 +1,298 @@
+"""graspatlas check, new and schema."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers import BENT, chain, robot, tripod_problem
+
+import graspatlas as ga
+from graspatlas import diagnosis
+from graspatlas.cli import main
+from graspatlas.collision import CollisionChecker
+from graspatlas.diagnosis import NOTE, OK, PROBLEM, Finding, diagnose, redundant_joints, report
+from graspatlas.problem_files import ProblemFileError, json_schema, read_problem
+from graspatlas.problem_files.reading import FILL_IN
+from graspatlas.problems import problem_text
+
+
+def found(problem: ga.Problem, subject: str, **options) -> Finding:
+    (one,) = [finding for finding in diagnose(problem, **options) if finding.subject == subject]
+    return one
+
+
+@pytest.mark.parametrize("name", ga.bundled_problems())
+def test_bundled_problems_have_no_problem(name, capsys):
+    assert main(["check", name]) == 0
+    out = capsys.readouterr().out
+    assert "0 problem" in out
+    problem = ga.load_problem(name)
+    assert f"t = {problem.full_dimension}" in out
+
+
+def test_numbers_of_the_can(can):
+    assert "23 unknowns; 3 contacts: 15 equations" in found(can, "freedoms").text
+    assert found(can, "rank").text == "15 of 15 at x1, so t = 8"
+    motions = found(can, "hand motions")
+    assert (motions.mark, motions.text) == (OK, "k = 2 freezes s = 6 of 13; 99.71 % of the variance stay")
+    assert "s = 5" in found(can, "hand motions", dimension=3).text
+    assert found(can, "hand motions", dimension=9).mark == PROBLEM
+    contacts = [finding.text for finding in diagnose(can) if finding.subject == "contact at x1"]
+    assert [text.partition(":")[0] for text in contacts] == ["middle_distal", "index_distal", "thumb_distal"]
+
+
+def test_little_variance_is_pointed_out():
+    planar = ga.load_problem("planar_hand")
+    finding = found(planar, "hand motions")
+    assert (finding.mark, planar.motions.variance_kept(1) < 0.9) == (NOTE, True)
+
+
+def test_equal_variances_are_pointed_out(can):
+    h = len(can.motions.joints)
+    motions = ga.HandMotions(can.motions.joints, np.zeros(h), np.eye(h))
+    assert "equal variance" in found(replace(can, motions=motions), "hand motions").hint
+
+
+def test_no_motions_and_no_defaults(can):
+    problem = replace(can, motions=None, defaults={})
+    assert found(problem, "hand motions").mark == PROBLEM
+    assert "no hand motions" in found(problem, "hand motions").text
+    assert "dimension, radius, epsilon, quality" in found(problem, "defaults").text
+    assert found(problem, "hand motions", dimension=8).mark == OK
+
+
+def test_a_contact_stated_twice_costs_rank(can):
+    twice = replace(can, contacts=(*can.contacts, can.contacts[0]))
+    finding = found(twice, "rank")
+    assert finding.mark == PROBLEM
+    assert "rank 15" in finding.text
+
+
+def test_an_idle_finger_is_redundant():
+    """A finger that touches nothing: each of its joints moves unfelt, and no other joint does."""
+    problem = tripod_problem(BENT)
+    idle = chain("d", (0.0, 0.08, 0.0), ["0 0 1", "0 1 0"], 0.05)
+    hand = ga.Hand("four", problem.hand.urdf.replace("</robot>", idle + "</robot>"))
+    x1 = ga.FirstGrasp({**BENT, "d0": 0.1, "d1": 0.2})
+    more = replace(problem, hand=hand, x1=x1)
+    assert redundant_joints(problem) == []
+    assert sorted(redundant_joints(more)) == [["d0"], ["d1"]]
+    assert "d0; d1" in found(more, "redundancies").text or "d1; d0" in found(more, "redundancies").text
+
+
+def test_joints_that_undo_each_other_are_redundant():
+    """Two joints about one axis: only their sum is felt."""
+    problem = tripod_problem(BENT)
+    twin = '<link name="twin"/><joint name="a9" type="revolute"><origin xyz="0.06 0 0"/><parent link="palm"/>'
+    twin += '<child link="twin"/><axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>'
+    old = '<origin xyz="0.06 0.0 0.0"/><parent link="palm"/>'
+    assert old in problem.hand.urdf
+    urdf = problem.hand.urdf.replace(old, '<origin xyz="0 0 0"/><parent link="twin"/>').replace(
+        "</robot>", twin + "</robot>"
+    )
+    more = replace(problem, hand=ga.Hand("twin", urdf), x1=ga.FirstGrasp({**BENT, "a9": 0.0}))
+    (group,) = redundant_joints(more)
+    assert sorted(group) == ["a0", "a9"]
+
+
+def test_a_straight_finger_at_x1_is_no_redundancy(can):
+    """The can's thumb is straight at x1, and there alone the contacts miss one of its motions."""
+    assert redundant_joints(can) == []
+    assert "at x1 itself" in found(can, "redundancies").text
+
+
+def test_an_object_that_spins_in_the_grasp_is_pointed_out(can):
+    assert found(can, "object").mark == OK
+    free = replace(can, contacts=tuple(replace(contact, frozen={}) for contact in can.contacts))
+    assert found(free, "object").text == "it can move in 2 ways while the hand stays still"
+
+
+def test_limits_near_x1_are_named(can):
+    limits = {"thumb_pip": (-0.001, 1.0)}
+    near = replace(can, hand=replace(can.hand, limits=limits))
+    assert found(near, "limits").text == "x1 is at the lower limit of joint 'thumb_pip' (0.001)"
+    assert found(can, "limits").mark == OK
+
+
+def test_collisions_at_x1_are_named(can):
+    assert found(can, "collision at x1").mark == OK
+    thick = can.object.urdf.replace('radius="0.02229"', 'radius="0.04"')
+    assert thick != can.object.urdf
+    finding = found(replace(can, object=replace(can.object, urdf=thick)), "collision at x1")
+    assert finding.mark == NOTE
+    assert "object/can_0" in finding.text
+    bare = replace(can, object=ga.Body("bare", robot()))
+    assert "no collision shape" in found(bare, "collision at x1").text
+
+
+def test_neighbouring_links_may_touch_without_an_srdf():
+    """All pairs of one joint, and of parent and child, are left out, and no other."""
+    hand = ga.load_problem("allegro_cylinder").hand
+    problem = replace(ga.load_problem("allegro_cylinder"), hand=replace(hand, srdf=""))
+    checker = CollisionChecker(problem)
+    model, geometry = checker._model, checker._geometry
+    hand_pairs = 0
+    for pair in geometry.collisionPairs:
+        a, b = (geometry.geometryObjects[i].parentJoint for i in (pair.first, pair.second))
+        assert a != b
+        if not geometry.geometryObjects[pair.second].name.startswith("object/"):
+            assert model.parents[a] != b
+            assert model.parents[b] != a
+            hand_pairs += 1
+    n = geometry.ngeoms - 1
+    shapes = [shape.parentJoint for shape in geometry.geometryObjects][:n]
+    expected = sum(
+        a != b and model.parents[a] != b and model.parents[b] != a
+        for i, a in enumerate(shapes)
+        for b in shapes[i + 1 :]
+    )
+    assert hand_pairs == expected
+
+
+def test_charts_are_counted_or_estimated(bottle, monkeypatch):
+    exact = found(bottle, "charts", radius=0.2)
+    traced = ga.optimize(bottle, radius=0.2).atlas.n_charts
+    assert exact.text.startswith(f"{traced} for k = 2, r = 0.2")
+
+    # Too little time for the radius, enough for a multiple: the estimate is of the right size.
+    wanted = ga.optimize(bottle, radius=0.025).atlas.n_charts
+    calls = []
+
+    def slow(system, x0, *, radius, epsilon, max_seconds, progress):
+        calls.append(radius)
+        charts = 100 if radius < 0.09 else None
+        atlas = ga.build_atlas(system, x0, radius=radius, epsilon=epsilon, max_charts=charts, progress=progress)
+        return replace(atlas, status=ga.Status.TIME_LIMIT) if charts else atlas
+
+    monkeypatch.setattr(diagnosis, "build_atlas", slow)
+    text = found(bottle, "charts", radius=0.025).text
+    assert calls == [0.025, 0.05, 0.1]
+    assert text.startswith("about ")
+    assert float(text.split()[1]) == pytest.approx(wanted, rel=0.35)
+    assert "an estimate from r = 0.1" in text
+    monkeypatch.setattr(diagnosis, "DOUBLINGS", 0)
+    assert found(bottle, "charts", radius=0.025).text.startswith("more than ")
+
+
+def test_a_radius_that_makes_no_sense(can):
+    assert found(can, "charts", radius=-1.0).mark == PROBLEM
+
+
+def test_report_is_aligned():
+    lines = report([Finding(OK, "a", "one", "x"), Finding(PROBLEM, "longer", "two", "y")]).splitlines()
+    assert lines == [
+        "ok       a       one",
+        "                 (x)",
+        "problem  longer  two",
+        "                 (y)",
+        "1 ok, 0 note, 1 problem",
+    ]
+
+
+def test_check_of_a_broken_file(tmp_path, capsys):
+    path = tmp_path / "mine.yaml"
+    path.write_text(problem_text("schunk_can")[0].replace("radius: 0.02224", "radius: wide"))
+    assert main(["check", str(path)]) == 1
+    out = capsys.readouterr().out
+    for i, line in enumerate((31, 41, 50)):
+        assert f"{path}:{line}: contacts[{i}].object.radius: must be a number, got 'wide'" in out
+    assert out.splitlines()[-1] == "0 ok, 0 note, 3 problem"
+    assert main(["check", str(path), "--json"]) == 1
+    findings = json.loads(capsys.readouterr().out)
+    assert [set(finding) for finding in findings] == [{"mark", "subject", "text", "hint"}] * 3
+    assert main(["check", str(tmp_path / "none.yaml")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_every_finding_has_a_hint(can, bottle):
+    for problem in (can, bottle, replace(can, motions=None), replace(can, defaults={})):
+        for finding in diagnose(problem):
+            assert finding.text
+            assert finding.hint
+
+
+HANDS = {
+    "a file": (lambda folder: str(folder / "hand.urdf"), "urdf: hand.urdf"),
+    "example-robot-data": (
+        lambda folder: "example_robot_data:allegro_right_hand",
+        "example_robot_data: allegro_right_hand",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HANDS)
+def test_a_new_problem_names_what_is_left_to_fill_in(name, tmp_path, capsys):
+    make, source = HANDS[name]
+    (tmp_path / "hand.urdf").write_text(tripod_problem(BENT).hand.urdf)
+    path = tmp_path / "new.yaml"
+    assert main(["new", make(tmp_path), "--output", str(path)]) == 0
+    text = path.read_text()
+    assert f"  {source}\n" in text
+    with pytest.raises(ProblemFileError) as caught:
+        ga.load_problem(path)
+    lines = [i for i, line in enumerate(text.splitlines(), 1) if f": {FILL_IN}" in line]
+    assert [int(one.removeprefix(f"{path}:").split(":")[0]) for one in caught.value.faults] == lines
+    assert main(["check", str(path)]) == 1
+    assert capsys.readouterr().out.count("is still to be filled in") == len(lines)
+    assert main(["new", make(tmp_path), "--output", str(path)]) == 2
+    assert "exists" in capsys.readouterr().err
+
+
+def test_a_new_problem_filled_in_is_one(tmp_path, capsys, monkeypatch):
+    """The template of the tripod, filled in by its own comments, is the tripod."""
+    monkeypatch.chdir(tmp_path)
+    problem = tripod_problem(BENT)
+    (tmp_path / "hand.urdf").write_text(problem.hand.urdf)
+    (tmp_path / "plate.urdf").write_text(problem.object.urdf)
+    assert main(["new", "hand.urdf", "--object", "plate.urdf"]) == 0
+    text = capsys.readouterr().out
+    for joint in problem.hand.joints:
+        assert f"  #   {joint}" in text
+        text = text.replace(f"#     {joint}: 0\n", f"     {joint}: {BENT[joint]!r}\n")
+    for frame in problem.hand.frames:
+        assert frame in text
+    for contact in problem.contacts:
+        hand, plane = contact.hand, contact.object
+        text = text.replace(f"frame: {FILL_IN}", f"frame: {contact.frame}", 1)
+        text = text.replace(f"position: {FILL_IN}", f"position: {list(hand.position)}", 1)
+        text = text.replace(f"normal: {FILL_IN}", f"normal: {list(hand.normal)}", 1)
+        rest = f"type: plane\n      origin: {list(plane.origin)}\n      normal: {list(plane.normal)} #"
+        text = text.replace(f"type: {FILL_IN}", rest, 1)
+    text = text.replace("# x1:", "x1:").replace("#   joints:\n", "   joints:\n")
+    text = text.replace("#   object_xyz: [0, 0, 0.1]", "   object_xyz: [0, 0, 0]").replace(
+        "#   object_quat", "   object_quat"
+    )
+    made = read_problem(text, "tripod.yaml", tmp_path)
+    np.testing.assert_allclose(made.x1_array, problem.x1_array, atol=1e-12)
+    assert made.full_dimension == problem.full_dimension
+    assert [str(r) for r in made.requirements] == ["force_closure:0.5:0.02", "collision_free:0.002:0"]
+
+
+def test_new_of_what_is_no_hand(tmp_path, capsys):
+    assert main(["new", str(tmp_path / "none.urdf")]) == 2
+    assert main(["new", "example_robot_data:allegro"]) == 2
+    (tmp_path / "text.urdf").write_text("hello")
+    assert main(["new", str(tmp_path / "text.urdf")]) == 2
+    assert capsys.readouterr().err.count("\n") == 3
+
+
+def test_schema(tmp_path, capsys):
+    assert main(["schema"]) == 0
+    assert json.loads(capsys.readouterr().out) == json_schema()
+    path = tmp_path / "problem.schema.json"
+    assert main(["schema", "--output", str(path)]) == 0
+    assert main(["schema", "--output", str(path)]) == 0
+    assert json.loads(path.read_text()) == json_schema()
+    assert main(["schema", "--output", str(tmp_path / "none" / "x.json")]) == 2
+
+
+def test_require_none_drops_the_requirements_of_the_file(tmp_path: Path, capsys):
+    words = ["optimize", "allegro_cylinder", "--radius", "0.4", "--output", str(tmp_path / "out")]
+    assert main(words) == 0
+    assert "meet the requirements" in capsys.readouterr().out
+    assert main([*words, "--require", "none"]) == 0
+    assert "meet the requirements" not in capsys.readouterr().out
