@@ -260,6 +260,11 @@ BROKEN: dict[str, tuple[str, str, str]] = {
         "  mean: # [rad]\n    [",
         "can.yaml:53: hand_motions: hand motions of 13 joints need a mean of shape (13,) and a covariance of shape ",
     ),
+    "ragged covariance": (
+        "    - [0.0, 0.0, 0.0,",
+        "    - [0.0, 0.0,",
+        "can.yaml:53: hand_motions: row 0 of the covariance holds 12 numbers, not 13",
+    ),
     "motions of another hand": (
         "[middle_abduction,",
         "[little_dip,",
@@ -677,6 +682,43 @@ def test_every_patch_and_requirement_is_in_the_schema():
         assert table["description"]
     for name in (*ga.quality.INDICES, *(r for r in ga.requirements.REQUIREMENTS)):
         assert f'"{name}"' in text
+
+
+ODD = [None, True, 0, -1, 3.5, 1e30, np.nan, -np.inf, "", "x", [], [1], ["x"], [[]], {}, {"x": 1}, {"type": "point"}]
+
+
+@pytest.mark.parametrize("text", [CAN, ALLEGRO], ids=["can", "allegro"])
+def test_odd_values_anywhere_are_refused_in_one_line(text):
+    """Any field replaced by anything, or dropped: a problem, or one line that names the file."""
+    rng = np.random.default_rng(5)
+    document = documents.parse(text)
+    paths = [path for path in document.lines if path]
+    refused = []
+    for _ in range(150):
+        data = json.loads(json.dumps(document.data))
+        *path, last = paths[rng.integers(len(paths))]
+        place = data
+        for key in path:
+            place = place[key]
+        if rng.uniform() < 0.1:
+            del place[last]
+        else:
+            place[last] = ODD[rng.integers(len(ODD))]
+        try:
+            read_problem(json.dumps(data), "odd.json", ROBOTS)
+        except ProblemFileError as error:
+            refused.append(str(error))
+    assert len(refused) > 100
+    assert [message for message in refused if not re.fullmatch(r"odd\.json:\d+: .+", message)] == []
+
+
+def test_the_schema_takes_a_requirement_by_its_name_alone():
+    choices = json_schema()["properties"]["requirements"]["items"]["anyOf"]
+    assert {"enum": list(ga.requirements.REQUIREMENTS), "type": "string"} in choices
+    assert {"$ref": "#/$defs/RequirementTable"} in choices
+    assert str(
+        read(CAN.replace("contacts:", "requirements: [collision_free, joint_margin:]\ncontacts:")).requirements[1]
+    ) == ("joint_margin:0.05")
 
 
 def fields_without_description(schema: dict[str, Any]) -> list[str]:

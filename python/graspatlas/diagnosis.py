@@ -98,7 +98,8 @@ def _size(problem: Problem) -> Finding:
 
 def _rank(problem: Problem) -> Finding:
     equations, t = problem.full_system.n_equations, problem.full_dimension
-    hint = f"a dimension k from 1 to {t} is possible"
+    largest = t - (len(problem.motions.couplings) if problem.motions else 0)
+    hint = f"a dimension k from 1 to {largest} is possible"
     return Finding(OK, "rank", f"{equations} of {equations} at x1, so t = {t}", hint)
 
 

@@ -189,4 +189,7 @@ class _Reading:
             return HandMotions.from_samples(samples, names)
         if table.mean is None or table.covariance is None:
             raise GraspAtlasError("need samples, or mean and covariance, or couplings")
+        for i, row in enumerate(table.covariance):
+            if len(row) != (h := len(table.covariance)):
+                raise GraspAtlasError(f"row {i} of the covariance holds {len(row)} numbers, not {h}")
         return HandMotions(tuple(table.joints or joints), np.array(table.mean), np.array(table.covariance))

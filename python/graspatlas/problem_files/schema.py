@@ -165,7 +165,11 @@ def _typed(cls: Any, patch: Any) -> type[Table]:
 
 def _with_values(value: Any) -> Any:
     """A requirement by its name alone has its default values."""
-    return {value: {}} if isinstance(value, str) else value
+    if isinstance(value, str):
+        return {value: {}}
+    if isinstance(value, dict):
+        return {key: {} if given is None else given for key, given in value.items()}
+    return value
 
 
 def _requirement_table() -> Any:
@@ -174,7 +178,8 @@ def _requirement_table() -> Any:
         for name, requirement in REQUIREMENTS.items()
     }
     table = create_model("RequirementTable", __base__=Table, __doc__="One requirement.", **tables)
-    return Annotated[table, BeforeValidator(_with_values)]
+    stated = Literal[tuple(REQUIREMENTS)] | table
+    return Annotated[table, BeforeValidator(_with_values, json_schema_input_type=stated)]
 
 
 Patch: Any = _patch_table()
