@@ -296,3 +296,9 @@ def test_require_none_drops_the_requirements_of_the_file(tmp_path: Path, capsys)
     assert "meet the requirements" in capsys.readouterr().out
     assert main([*words, "--require", "none"]) == 0
     assert "meet the requirements" not in capsys.readouterr().out
+
+
+def test_a_first_grasp_is_found_where_none_is_given(can):
+    without = replace(can, x1=None, reference=can.x1.joints)
+    assert found(without, "first grasp").mark == "ok"
+    assert found(without, "charts").mark != "problem"

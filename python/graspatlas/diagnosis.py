@@ -14,6 +14,7 @@ from graspatlas.collision import CollisionChecker
 from graspatlas.errors import GraspAtlasError
 from graspatlas.optimizer import build_atlas
 from graspatlas.problem import Problem
+from graspatlas.search import with_first_grasp
 
 __all__ = ["NOTE", "OK", "PROBLEM", "Finding", "diagnose", "redundant_joints", "report"]
 
@@ -32,6 +33,8 @@ NEAR_LIMIT = 0.02
 LITTLE_VARIANCE = 0.9
 #: Two variances closer than this share of the largest are the same.
 SAME_VARIANCE = 1e-9
+#: How long to look for a first grasp where none is given [s].
+SEARCH_SECONDS = 10.0
 #: How long an atlas may grow for the estimate of its size [s], and how often its radius may be doubled.
 ESTIMATE_SECONDS, DOUBLINGS = 0.5, 3
 
@@ -70,8 +73,13 @@ def diagnose(problem: Problem, *, dimension: int | None = None, radius: float | 
     """
     findings = [_size(problem)]
     if problem.x1 is None:
-        hint = "give one under x1, or let graspatlas find one: graspatlas.find_grasps"
-        return [*findings, Finding(NOTE, "first grasp", "there is none, so nothing below is known", hint)]
+        try:
+            problem = with_first_grasp(
+                problem, dimension or problem.defaults.get("dimension") or 2, SEARCH_SECONDS, False
+            )
+        except GraspAtlasError as error:
+            return [*findings, Finding(PROBLEM, "first grasp", str(error), "what follows is not known without one")]
+        findings.append(Finding(OK, "first grasp", "none given, but one is found", "x1 below is the one found"))
     try:
         t = problem.full_dimension
     except GraspAtlasError as error:

@@ -16,19 +16,8 @@ from graspatlas.patches.turned import Cone, Cylinder, Revolution
 
 __all__ = ["patch_from_dict", "patch_types"]
 
-_CLASSES: tuple[type[Patch], ...] = (
-    Point,
-    Plane,
-    Cylinder,
-    Cone,
-    Revolution,
-    Sphere,
-    Torus,
-    Ellipsoid,
-    Bezier,
-    BSpline,
-    Curve,
-)
+_ROUND = (Cylinder, Cone, Revolution, Sphere, Torus, Ellipsoid)
+_CLASSES: tuple[type[Patch], ...] = (Point, Plane, *_ROUND, Bezier, BSpline, Curve)
 _KINDS: dict[str, type[Patch]] = {c.kind: c for c in _CLASSES}
 
 

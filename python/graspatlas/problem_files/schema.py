@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Union
+from typing import Annotated, Any, Literal, Union, get_type_hints
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
 
-from graspatlas.patches import patch_types
+from graspatlas.patches import Patch, patch_types
 from graspatlas.problem_files.tables import Finite, Table, exactly_one, known_name, table_of
 from graspatlas.quality import INDICES
 from graspatlas.requirements import REQUIREMENTS
@@ -152,10 +152,14 @@ class DefaultsTable(Table):
 
 
 def _patch_table() -> Any:
-    """A patch of any type."""
-    inner = [_typed(cls, Any) for cls in patch_types()]
-    patch: Any = Annotated[Union[tuple(inner)], Field(discriminator="type")]  # noqa: UP007
-    tables = [_typed(cls, patch) for cls in patch_types()]
+    """A patch of any type; those that lie on another patch lie on one that does not."""
+    on_patch = {cls for cls in patch_types() if Patch in get_type_hints(cls).values()}
+    plain = [_typed(cls, None) for cls in patch_types() if cls not in on_patch]
+    tables = plain + [_typed(cls, _one_of(plain)) for cls in patch_types() if cls in on_patch]
+    return _one_of(tables)
+
+
+def _one_of(tables: list[type[Table]]) -> Any:
     return Annotated[Union[tuple(tables)], Field(discriminator="type")]  # noqa: UP007
 
 
@@ -182,7 +186,7 @@ def _requirement_table() -> Any:
     return Annotated[table, BeforeValidator(_with_values, json_schema_input_type=stated)]
 
 
-Patch: Any = _patch_table()
+PatchTable: Any = _patch_table()
 
 
 class ContactTable(Table):
@@ -190,9 +194,9 @@ class ContactTable(Table):
 
     frame: str
     """Link or frame of the hand that carries the hand's patch."""
-    hand: Patch
+    hand: PatchTable
     """Patch in that frame; its normal points out of the hand."""
-    object: Patch
+    object: PatchTable
     """Patch in the object's frame; its normal points out of the object."""
     frozen: dict[str, Finite] = Field(default_factory=dict)
     """Parameters of the object's patch that do not move, such as {u: 0.5}."""
