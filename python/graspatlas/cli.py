@@ -98,6 +98,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     best.add_argument("--max-charts", type=int, metavar="N", help="cut the atlas short after N charts")
     best.add_argument("--max-seconds", type=float, metavar="S", help="cut the atlas short after S seconds")
+    best.add_argument("--threads", type=int, metavar="N", help="threads to use, all cores by default; same result")
     best.add_argument("--output", type=Path, metavar="FOLDER", help="write result.npz and summary.json there")
     best.add_argument("--json", action="store_true", help="print one JSON object on standard output")
     best.set_defaults(run=_optimize)
@@ -152,6 +153,7 @@ def _optimize(options: argparse.Namespace) -> int:
         require=require,
         max_charts=options.max_charts,
         max_seconds=options.max_seconds,
+        threads=options.threads,
         progress=True,
     )
     if folder:
