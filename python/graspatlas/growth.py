@@ -58,7 +58,7 @@ class Growth:
         epsilon: float,
     ) -> None:
         self.builder = builder
-        self._ratio = _COARSE_SHARE ** (-1 / system.dimension)
+        self._ratio = float(_COARSE_SHARE ** (-1 / system.dimension))
         self._coarse_arguments = (system, x0, self._ratio * radius, epsilon, builder.n_threads)
         self._coarse: _core.AtlasBuilder | None = None
         self._dimension = system.dimension
@@ -114,7 +114,7 @@ class Growth:
             self._coarse.expand(self.builder.n_charts, seconds)
         if not self._coarse.complete:
             return None
-        return round(self._coarse.n_charts * self._ratio**self._dimension)
+        return round(float(self._coarse.n_charts * self._ratio**self._dimension))
 
 
 def outlook(builder: _core.AtlasBuilder, size: int | None, seconds: float) -> str:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
 #include <thread>
 
@@ -15,6 +16,10 @@ namespace {
 constexpr int kMostCharts = 64;
 // How often a thread looks whether it may go on before it goes to sleep.
 constexpr int kLooks = 100;
+// A generation of fewer charts keeps its own order, which packs charts best: threads would mostly wait for each other.
+constexpr int kSmall = 64;
+// In the order of a large one, a chart is far from so many before it, if one of so many to come is.
+constexpr int kFarFrom = 7, kChoices = 24;
 
 void check_options(const AtlasOptions& options, const System& system) {
   if (!(options.radius > 0.0)) throw Error("radius must be positive, got " + to_text(options.radius));
@@ -61,7 +66,7 @@ Atlas::Atlas(System& system, const double* x0, const AtlasOptions& options, int 
 }
 
 std::int64_t Atlas::open_count() const {
-  return static_cast<std::int64_t>(leaps_.size() - position_ + order_.size() - next_first_ + again_.size());
+  return static_cast<std::int64_t>(turns_.size() - position_ + order_.size() - next_first_ + again_.size());
 }
 
 std::int64_t Atlas::projections() const {
@@ -111,6 +116,8 @@ void Atlas::work(Worker& worker) {
       finish_task(worker, task, task.most);  // as if more were to be made
       const std::lock_guard lock(mutex_);
       stop_ = true;
+      changed_.notify_all();
+      helpers_wanted_.notify_all();
       throw;
     }
     finish_task(worker, task, made);
@@ -131,26 +138,34 @@ void Atlas::wait(Lock& lock, Condition condition) {
 // Towards the limit of charts, tasks come one by one and with what is left, so that it is met exactly.
 bool Atlas::may_take() const {
   if (stop_ || running_ == 0) return true;
-  return position_ < leaps_.size() && chart_limit_ - made_ - promised_ >= kMostCharts;
+  return position_ < turns_.size() && chart_limit_ - made_ - promised_ >= kMostCharts;
 }
 
 // The next chart to expand, once that can begin; false when there is none, or the time is up.
 bool Atlas::take_task(Worker& worker, Task& task) {
   Lock lock(mutex_);
-  wait(lock, [this] { return may_take(); });
-  if (stop_) return false;
-  if ((position_ == leaps_.size() && !next_generation()) || made_ >= chart_limit_) {
+  const bool helper = &worker != workers_.front().get();
+  do {
+    if (helper) helpers_wanted_.wait(lock, [this] { return stop_ || !small(); });
+    wait(lock, [this, helper] { return may_take() || (helper && small()); });
+    if (stop_) return false;
+  } while (helper && small());
+  if ((position_ == turns_.size() && !next_generation(worker)) || made_ >= chart_limit_) {
     stop_ = true;
     changed_.notify_all();
+    helpers_wanted_.notify_all();
     return false;
   }
-  task.slot = generation_[static_cast<std::size_t>(leaps_[position_++])];
+  task.slot = generation_[static_cast<std::size_t>(turns_[position_++])];
   task.most = static_cast<int>(std::min<std::int64_t>(kMostCharts, chart_limit_ - made_ - promised_));
   task.number = ++task_count_;
   promised_ += task.most;
   ++running_;
   find_conflicts(worker, task);
-  if (Clock::now() > deadline_) stop_ = true;  // but this task is done
+  if (Clock::now() > deadline_) {
+    stop_ = true;  // but this task is done
+    helpers_wanted_.notify_all();
+  }
   wait(lock, [&task] {
     return std::none_of(task.before.begin(), task.before.end(),
                         [](const auto& other) { return other.first->task == other.second; });
@@ -187,16 +202,53 @@ void Atlas::finish_task(Worker& worker, const Task& task, int made) {
 }
 
 // All charts that are new, in their order, and those that were not done. False when there is none.
-bool Atlas::next_generation() {
+bool Atlas::next_generation(Worker& worker) {
   settle_order();
   std::sort(again_.begin(), again_.end(), [this](int a, int b) { return charts_[a].key < charts_[b].key; });
   generation_ = again_;
   generation_.insert(generation_.end(), order_.begin() + static_cast<std::ptrdiff_t>(next_first_), order_.end());
   next_first_ = order_.size();
   again_.clear();
-  leaps_ = leaping_order(static_cast<int>(generation_.size()));
+  choose_order(worker);
   position_ = 0;
+  if (!small()) helpers_wanted_.notify_all();
   return !generation_.empty();
+}
+
+bool Atlas::small() const { return static_cast<int>(generation_.size()) < kSmall; }
+
+// The order in which the generation is expanded: it depends on the charts only.
+void Atlas::choose_order(Worker& worker) {
+  const int count = static_cast<int>(generation_.size()), size = system_.embedding_size();
+  turns_.resize(generation_.size());
+  std::iota(turns_.begin(), turns_.end(), 0);
+  if (small()) return;
+  std::vector<double> embeddings(generation_.size() * static_cast<std::size_t>(size));
+  for (std::size_t i = 0; i < generation_.size(); ++i)
+    std::copy_n(worker.expander->embedding_of(generation_[i]), size, &embeddings[i * size]);
+  const double distance = kIndependent * options_.radius;
+  const auto near = [&](int i, int j) {
+    return is_within(&embeddings[static_cast<std::size_t>(i) * size], &embeddings[static_cast<std::size_t>(j) * size],
+                     size, distance * distance);
+  };
+  const std::vector<int> leaps = leaping_order(count);
+  std::vector<int> choices;
+  for (int turn = 0, next = 0; turn < count; ++turn) {
+    while (next < count && static_cast<int>(choices.size()) < kChoices) choices.push_back(leaps[next++]);
+    // The choice that is far from the most charts just before it.
+    const int most = std::min(turn, kFarFrom);
+    int best = 0, best_far = -1;
+    for (int c = 0; c < static_cast<int>(choices.size()) && best_far < most; ++c) {
+      int far = 0;
+      while (far < most && !near(choices[c], turns_[turn - 1 - far])) ++far;
+      if (far > best_far) {
+        best = c;
+        best_far = far;
+      }
+    }
+    turns_[turn] = choices[best];
+    choices.erase(choices.begin() + best);
+  }
 }
 
 // Numbers the charts that have come; no task may be running.

@@ -20,11 +20,11 @@ namespace graspatlas {
 /// agree to 1 - epsilon; and each polytope lies in the half-space nearer to its own centre than to the other's, both
 /// seen in its own tangent space.
 ///
-/// The charts that are open at one time are a generation; the charts made from them are the next. A generation is
-/// expanded in an order that leaps about its front, so that charts next to each other in the order are mostly far
-/// apart. Threads take charts in this order, and a thread waits while an earlier chart is being expanded that is too
-/// near (kIndependent) for the two to leave each other's charts alone. So the atlas is the one that a single thread
-/// would make, to the bit.
+/// The charts that are open at one time are a generation; the charts made from them are the next. A small generation is
+/// expanded in its own order by one thread. A large one is expanded in an order that leaps about its front, so that
+/// charts next to each other in the order are mostly far apart. Threads take charts in this order, and a thread waits
+/// while an earlier chart is being expanded that is too near (kIndependent) for the two to leave each other's charts
+/// alone. So the atlas is the one that a single thread would make, to the bit.
 class Atlas {
  public:
   /// Starts with one chart at the point of the manifold nearest x0.
@@ -77,10 +77,12 @@ class Atlas {
   void find_conflicts(Worker& worker, Task& task);
   void finish_task(Worker& worker, const Task& task, int made);
   bool may_take() const;
-  bool next_generation();
+  bool next_generation(Worker& worker);
+  void choose_order(Worker& worker);
   void settle_order();
   template <class Condition>
   void wait(Lock& lock, Condition condition);
+  bool small() const;
 
   System& system_;
   AtlasOptions options_;
@@ -88,15 +90,15 @@ class Atlas {
   std::vector<std::unique_ptr<Worker>> workers_;
   std::vector<int> order_;  // slots in the order of the algorithm
 
-  std::vector<int> generation_, leaps_;  // slots of the charts to expand, and the order to take them in
-  std::size_t position_ = 0;             // in leaps_
+  std::vector<int> generation_, turns_;  // slots of the charts to expand, and the order to take them in
+  std::size_t position_ = 0;             // in turns_
   std::size_t next_first_ = 0;           // in order_: where the next generation begins
   std::vector<int> again_;               // charts that made as many as one task may and are not done
   std::int64_t task_count_ = 0;
 
   // State of one call of expand, guarded by mutex_.
   std::mutex mutex_;
-  std::condition_variable changed_;
+  std::condition_variable changed_, helpers_wanted_;
   std::int64_t chart_limit_ = 0, made_ = 0, promised_ = 0;  // charts that tasks have made, and may still make
   int running_ = 0;
   bool stop_ = false;
