@@ -1,4 +1,4 @@
-"""Time the engine on one thread and print medians: ``make bench``.
+"""Time the engine and print medians, on one thread unless a row says otherwise: ``make bench``.
 
 Figures depend on the machine; compare them as ratios within one run. Every row also prints what it found, so that a
 faster but wrong engine is seen at once.
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 import graspatlas as ga
+from graspatlas import _core
 
 REPEATS = 7
 
@@ -32,7 +33,9 @@ def median_seconds(work: Callable[[], Any]) -> tuple[float, Any]:
 
 def atlas_row(name: str, system: ga.systems.AnySystem, x0: Any, radius: float, epsilon: float) -> None:
     """Time one atlas and print a row."""
-    seconds, atlas = median_seconds(lambda: ga.build_atlas(system, x0, radius=radius, epsilon=epsilon, progress=False))
+    seconds, atlas = median_seconds(
+        lambda: ga.build_atlas(system, x0, radius=radius, epsilon=epsilon, threads=1, progress=False)
+    )
     rate = atlas.n_charts / seconds
     print(f"{name:32} {atlas.n_charts:7d} charts {1e3 * seconds:9.1f} ms {rate:9.0f} charts/s   {atlas.status}")
 
@@ -62,6 +65,25 @@ def index_row(index: str, problem: ga.Problem, atlas: ga.Atlas) -> None:
     print(f"{'  ' + index:32} {len(values):7d} grasps {1e3 * seconds:9.1f} ms {each:9.2f} us each   best {best:.6g}")
 
 
+def thread_row(name: str, dimension: int, radius: float, threads: int) -> None:
+    """Time one atlas on one thread and on several, and print the ratio and the memory of a chart."""
+    problem = ga.load_problem(name)
+    system = problem.system(dimension)
+    times = {}
+    for count in (1, threads):
+        builders = []
+        for _ in range(REPEATS):
+            builder = _core.AtlasBuilder(system, problem.x1_array, radius, 0.5, count)
+            start = time.perf_counter()
+            builder.expand(2**62, float("inf"))
+            builders.append(time.perf_counter() - start)
+        times[count] = statistics.median(builders)
+    print(
+        f"{f'{name} k={dimension} r={radius:g}':32} {builder.n_charts:7d} charts: {threads} threads "
+        f"{times[1] / times[threads]:.2f} times as fast as one; {builder.n_bytes / builder.n_charts:.0f} bytes a chart"
+    )
+
+
 def projection_row() -> None:
     """Time single projections of the can onto its manifold, from a chart's radius away."""
     problem = ga.load_problem("schunk_can")
@@ -79,7 +101,7 @@ def main() -> None:
     """Print all rows."""
     print(
         f"graspatlas {ga.__version__}, Python {platform.python_version()}, {platform.machine()}; "
-        f"medians of {REPEATS} runs, one thread"
+        f"medians of {REPEATS} runs"
     )
     atlas_row("sphere r=0.1", ga.systems.Sphere(3), [1.0, 0.0, 0.0], 0.1, 0.1)
     atlas_row("torus r=0.1", ga.systems.Torus(0.8, 0.5), [1.3, 0.0, 0.0], 0.1, 0.1)
@@ -89,6 +111,8 @@ def main() -> None:
     grasp_rows("schunk_oil_bottle", 2, 0.04)
     grasp_rows("schunk_oil_bottle", 3, 0.1)
     projection_row()
+    for name, dimension, radius in (("schunk_can", 2, 0.05), ("schunk_oil_bottle", 3, 0.0575)):
+        thread_row(name, dimension, radius, 2)
 
 
 if __name__ == "__main__":

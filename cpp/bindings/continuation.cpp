@@ -92,11 +92,12 @@ py::array_t<double> copied(const double* data, py::ssize_t rows, py::ssize_t col
 /// The whole atlas as arrays; ragged parts (facets, vertices) as values and row offsets.
 ArrayTable atlas_arrays(const Atlas& atlas) {
   const py::ssize_t n = atlas.count(), k = atlas.system().dimension(), v = atlas.system().tangent_size();
-  py::ssize_t facets = 0, vertices = 0;
+  py::ssize_t facets = 0, vertices = 0, pair_count = 0;
   for (py::ssize_t i = 0; i < n; ++i) {
-    const Polytope& p = atlas.polytope(i);
+    const Polytope& p = atlas.chart(i).polytope;
     for (int f = 0; f < p.facet_slots(); ++f) facets += p.facet_active(f);
     vertices += p.vertex_count();
+    pair_count += atlas.chart(i).neighbour_count;
   }
   const py::ssize_t x_size = atlas.system().configuration_size();
   auto centers = matrix<double>(n, x_size);
@@ -111,15 +112,15 @@ ArrayTable atlas_arrays(const Atlas& atlas) {
   for (py::ssize_t i = 0; i < n; ++i) {
     std::copy_n(atlas.center(i), x_size, centers.mutable_data(i, 0));
     std::copy_n(atlas.basis(i), k * v, bases.mutable_data(i, 0, 0));
-    residuals.mutable_at(i) = atlas.residual(i);
+    residuals.mutable_at(i) = atlas.chart(i).residual;
     facet_start.mutable_at(i) = f_at;
     vertex_start.mutable_at(i) = v_at;
-    const Polytope& p = atlas.polytope(i);
+    const Polytope& p = atlas.chart(i).polytope;
     for (int f = 0; f < p.facet_slots(); ++f) {
       if (!p.facet_active(f)) continue;
       std::copy_n(p.normal(f), k, normals.mutable_data(f_at, 0));
       offsets.mutable_at(f_at) = p.offset(f);
-      tags.mutable_at(f_at++) = p.tag(f);
+      tags.mutable_at(f_at++) = p.tag(f) >= 0 ? atlas.number(p.tag(f)) : p.tag(f);
     }
     for (int a = 0; a < p.vertex_count(); ++a) {
       std::copy_n(p.vertex(a), k, positions.mutable_data(v_at, 0));
@@ -128,11 +129,14 @@ ArrayTable atlas_arrays(const Atlas& atlas) {
   }
   facet_start.mutable_at(n) = f_at;
   vertex_start.mutable_at(n) = v_at;
-  auto pairs = matrix<std::int32_t>(static_cast<py::ssize_t>(atlas.neighbour_pairs().size()), 2);
+  auto pairs = matrix<std::int32_t>(pair_count, 2);
   std::int32_t* pair = pairs.mutable_data();
-  for (const auto& [a, b] : atlas.neighbour_pairs()) {
-    *pair++ = a;
-    *pair++ = b;
+  for (py::ssize_t j = 0; j < n; ++j) {
+    const Chart& chart = atlas.chart(j);
+    for (int c = 0; c < chart.neighbour_count; ++c) {
+      *pair++ = atlas.number(chart.neighbours[c]);
+      *pair++ = static_cast<std::int32_t>(j);
+    }
   }
   ArrayTable out;
   out["centers"] = centers;
@@ -234,7 +238,8 @@ void bind_parts(py::module_& module) {
           [](Polytope& p, const DoubleArray& normal, double offset, int tag) {
             const double* n = checked_vector(normal, p.dimension(), "normal");
             if (!(offset >= 0.0)) throw Error("offset must not be negative: a polytope keeps the origin");
-            return p.cut(n, offset, tag);
+            Polytope::Scratch scratch;
+            return p.cut(n, offset, tag, scratch);
           },
           py::arg("normal"), py::arg("offset"), py::arg("tag"),
           "Keep normal . u <= offset; False if nothing is cut off.")
@@ -250,13 +255,18 @@ void bind_parts(py::module_& module) {
   py::class_<Neighbours>(module, "Neighbours", "Points that come one by one, and those within a distance of any point.")
       .def(py::init<int>(), py::arg("size"))
       .def(
-          "insert", [](Neighbours& t, const DoubleArray& point) { t.insert(checked_vector(point, t.size(), "point")); },
-          py::arg("point"), "Add a point [size].")
+          "insert",
+          [](Neighbours& t, const DoubleArray& point) {
+            t.insert(checked_vector(point, t.size(), "point"), t.count());
+          },
+          py::arg("point"), "Add a point [size]; points are numbered 0, 1, 2, ... as they come.")
       .def(
           "within",
           [](const Neighbours& t, const DoubleArray& point, double distance) {
             std::vector<int> out;
-            t.within(checked_vector(point, t.size(), "point"), distance, out);
+            Neighbours::Scratch scratch;
+            t.within(checked_vector(point, t.size(), "point"), distance, out, scratch);
+            std::sort(out.begin(), out.end());
             return out;
           },
           py::arg("point"), py::arg("distance"), "Numbers of the points within a distance, ascending.");
@@ -268,19 +278,24 @@ void bind_continuation(py::module_& module) {
   bind_systems(module);
   bind_parts(module);
   py::class_<Atlas>(module, "AtlasBuilder", "Grows an atlas chart by chart (Algorithm 1, lines 4 to 13).")
-      .def(py::init([](System& system, const DoubleArray& x0, double radius, double epsilon) {
+      .def(py::init([](System& system, const DoubleArray& x0, double radius, double epsilon, int threads) {
              AtlasOptions options;
              options.radius = radius;
              options.epsilon = epsilon;
-             return std::make_unique<Atlas>(system, checked_vector(x0, system.configuration_size(), "x0"), options);
+             return std::make_unique<Atlas>(system, checked_vector(x0, system.configuration_size(), "x0"), options,
+                                            threads);
            }),
-           py::arg("system"), py::arg("x0"), py::arg("radius"), py::arg("epsilon"), py::keep_alive<1, 2>())
+           py::arg("system"), py::arg("x0"), py::arg("radius"), py::arg("epsilon"), py::arg("threads") = 1,
+           py::keep_alive<1, 2>())
       .def("expand", &Atlas::expand, py::arg("chart_limit"), py::arg("seconds"),
            py::call_guard<py::gil_scoped_release>(),
            "Expand until complete, the limit of charts is reached, or the seconds have passed.")
       .def_property_readonly("complete", &Atlas::complete, "True when no chart is left to expand.")
       .def_property_readonly("n_open", &Atlas::open_count, "Charts still to be expanded.")
       .def_property_readonly("n_charts", &Atlas::count, "Charts so far.")
+      .def_property_readonly("n_threads", &Atlas::threads, "Threads that it uses.")
+      .def_property_readonly("n_bytes", &Atlas::bytes, "Memory that it holds.")
+      .def_property_readonly("n_array_bytes", &Atlas::array_bytes, "Memory that its arrays would take, at most.")
       .def_property_readonly("n_projections", &Atlas::projections, "Newton projections so far.")
       .def("arrays", &atlas_arrays, "The atlas as a dictionary of arrays.");
   module.def(

@@ -190,7 +190,7 @@ class Neighbours:
     def __init__(self, size: typing.SupportsInt | typing.SupportsIndex) -> None: ...
     def insert(self, point: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         """
-        Add a point [size].
+        Add a point [size]; points are numbered 0, 1, 2, ... as they come.
         """
     def within(
         self,
@@ -211,6 +211,7 @@ class AtlasBuilder:
         x0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         radius: typing.SupportsFloat | typing.SupportsIndex,
         epsilon: typing.SupportsFloat | typing.SupportsIndex,
+        threads: typing.SupportsInt | typing.SupportsIndex = 1,
     ) -> None: ...
     def arrays(self) -> dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]]:
         """
@@ -230,6 +231,16 @@ class AtlasBuilder:
         True when no chart is left to expand.
         """
     @property
+    def n_array_bytes(self) -> int:
+        """
+        Memory that its arrays would take, at most.
+        """
+    @property
+    def n_bytes(self) -> int:
+        """
+        Memory that it holds.
+        """
+    @property
     def n_charts(self) -> int:
         """
         Charts so far.
@@ -243,6 +254,11 @@ class AtlasBuilder:
     def n_projections(self) -> int:
         """
         Newton projections so far.
+        """
+    @property
+    def n_threads(self) -> int:
+        """
+        Threads that it uses.
         """
 
 class JointInfo:

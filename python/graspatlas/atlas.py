@@ -39,6 +39,7 @@ class Status(str, Enum):
     COMPLETE = "complete"
     CHART_LIMIT = "cut short: limit of charts"
     TIME_LIMIT = "cut short: limit of time"
+    MEMORY_LIMIT = "cut short: limit of memory"
     INTERRUPTED = "cut short: interrupted"
 
     def __str__(self) -> str:

@@ -127,6 +127,7 @@ def _parser() -> argparse.ArgumentParser:
         help="search for other connected components too, and take the best grasp over all of them; --max-seconds then "
         "limits the whole search",
     )
+    best.add_argument("--threads", type=int, metavar="N", help="threads to use, all cores by default; same result")
     best.add_argument("--output", type=Path, metavar="FOLDER", help="write result.npz and summary.json there")
     best.add_argument("--json", action="store_true", help="print one JSON object on standard output")
     best.set_defaults(run=_optimize)
@@ -221,7 +222,7 @@ def _optimize(options: argparse.Namespace) -> int:
     problem = load_problem(options.problem)
     require = [parse_requirement(text) for text in options.require if text != "none"] if options.require else None
     folder = writable_folder(options.output) if options.output else None
-    names = ("dimension", "radius", "epsilon", "quality", "refine", "max_charts", "max_seconds")
+    names = ("dimension", "radius", "epsilon", "quality", "refine", "max_charts", "max_seconds", "threads")
     given = {name: getattr(options, name) for name in names}
     if options.components:
         return _report_components(find_components(problem, **given, require=require, progress=True), options, folder)

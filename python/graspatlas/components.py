@@ -135,6 +135,7 @@ def find_components(
     refine: bool | str = False,
     max_charts: int | None = None,
     max_seconds: float | None = None,
+    threads: int | None = None,
     covered: int = 300,
     seed: int = 0,
     progress: bool | None = None,
@@ -153,6 +154,7 @@ def find_components(
         refine: Refine the best of each component; see :func:`graspatlas.optimize`.
         max_charts: Number of charts after which the atlas of a component is cut short; none by default.
         max_seconds: Time after which the search ends; none by default. An atlas that is growing then is cut short.
+        threads: See :func:`graspatlas.build_atlas`.
         covered: The search ends when as many grasps in a row were covered: by default 300, after which components not
             found yet get at most 1 % of the finds with 95 % confidence.
         seed: Of the random numbers.
@@ -170,7 +172,7 @@ def find_components(
         raise GraspAtlasError(f"covered must be a whole number of at least 1, got {covered!r}")
     given = {"dimension": dimension, "radius": radius, "epsilon": epsilon, "quality": quality}
     options = options_of(problem, given)
-    options |= {"require": require, "refine": refine, "max_charts": max_charts}
+    options |= {"require": require, "refine": refine, "max_charts": max_charts, "threads": threads}
     traced = _Tracer(options, deadline_after(max_seconds), progress)
     start = time.perf_counter()
     search = GraspSearch(problem, options["dimension"], seed)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,12 +10,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from tqdm import tqdm
 
 from graspatlas import _core
-from graspatlas.atlas import Atlas, Status
+from graspatlas.atlas import Atlas
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasps
+from graspatlas.growth import Growth, Limits, available_bytes, available_threads
 from graspatlas.problem import Problem
 from graspatlas.quality import Quality, evaluate, find_index, quality_name
 from graspatlas.refinement import refine as climb_peaks
@@ -28,8 +27,6 @@ from graspatlas.systems import AnySystem
 __all__ = ["build_atlas", "optimize"]
 
 _NO_LIMIT = 2**62
-_SLICE_SECONDS = 0.1  # between looks at the clock, at Ctrl-C and at the progress bar
-_QUIET_SECONDS = 1.0  # work that ends within this shows no progress bar
 
 
 def build_atlas(
@@ -40,11 +37,14 @@ def build_atlas(
     epsilon: float,
     max_charts: int | None = None,
     max_seconds: float | None = None,
+    max_bytes: float | None = None,
+    threads: int | None = None,
     progress: bool | None = None,
 ) -> Atlas:
     """Cover the solutions of R(x) = 0 that are connected to a first point with charts.
 
-    Ctrl-C ends the work and returns what there is, with a status that says so.
+    Ctrl-C ends the work and returns what there is, with a status that says so. The atlas is the same to the bit for
+    any number of threads.
 
     Args:
         system: The equations: one of :mod:`graspatlas.systems`, a problem's, or your own subclass of
@@ -55,6 +55,9 @@ def build_atlas(
             spaces; between 0 and 1.
         max_charts: Number of charts after which the atlas is cut short; none by default.
         max_seconds: Time after which the atlas is cut short; none by default.
+        max_bytes: Memory of the atlas, with the arrays that are made of it, beyond which it is cut short; by default
+            four fifths of what the machine (or the container) has free.
+        threads: Threads that work at the same time; all cores by default. A system written in Python has one.
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
     Returns:
@@ -70,51 +73,18 @@ def build_atlas(
     radius = _positive("radius", radius)
     epsilon = _positive("epsilon", epsilon)
     charts = _NO_LIMIT if max_charts is None else _whole("max_charts", max_charts)
-    limit = float("inf") if max_seconds is None else _positive("max_seconds", max_seconds)
+    seconds = float("inf") if max_seconds is None else _positive("max_seconds", max_seconds)
+    memory = available_bytes() if max_bytes is None else _positive("max_bytes", max_bytes)
+    workers = available_threads() if threads is None else _whole("threads", threads)
     start = time.perf_counter()
-    builder = _core.AtlasBuilder(system, _numbers("x0", x0), radius, epsilon)
-    status = _grow(builder, charts, start + limit, progress)
-    seconds = time.perf_counter() - start
+    first = _numbers("x0", x0)
+    builder = _core.AtlasBuilder(system, first, radius, epsilon, workers)
+    growth = Growth(builder, system, first, radius, epsilon)
+    status = growth.run(Limits(charts, start + seconds, memory), progress)
+    arrays = builder.arrays()
     return Atlas(
-        system=system,
-        radius=radius,
-        epsilon=epsilon,
-        status=status,
-        seconds=seconds,
-        **builder.arrays(),
+        system=system, radius=radius, epsilon=epsilon, status=status, seconds=time.perf_counter() - start, **arrays
     )
-
-
-def _grow(builder: _core.AtlasBuilder, max_charts: int, deadline: float, progress: bool | None) -> Status:
-    shown = sys.stderr.isatty() if progress is None else progress
-    # In a file a line every ten seconds is enough.
-    interval = 0.1 if sys.stderr.isatty() else 10.0
-    bar = tqdm(
-        desc="atlas",
-        unit=" charts",
-        disable=not shown,
-        delay=_QUIET_SECONDS,
-        file=sys.stderr,
-        initial=1,
-        mininterval=interval,
-    )
-    try:
-        while not builder.complete:
-            remaining = deadline - time.perf_counter()
-            if remaining <= 0.0:
-                return Status.TIME_LIMIT
-            if builder.n_charts >= max_charts:
-                return Status.CHART_LIMIT
-            builder.expand(max_charts, min(_SLICE_SECONDS, remaining))
-            bar.set_postfix(open=builder.n_open, refresh=False)
-            bar.update(builder.n_charts - bar.n)
-    except KeyboardInterrupt:
-        if shown:
-            print(f"interrupted: keeping {builder.n_charts} charts", file=sys.stderr)
-        return Status.INTERRUPTED
-    finally:
-        bar.close()
-    return Status.COMPLETE
 
 
 def optimize(
@@ -128,6 +98,8 @@ def optimize(
     refine: bool | str = False,
     max_charts: int | None = None,
     max_seconds: float | None = None,
+    max_bytes: float | None = None,
+    threads: int | None = None,
     progress: bool | None = None,
 ) -> Result:
     """Find the best grasp of a problem: trace all relevant grasps, then read a quality index on them.
@@ -148,6 +120,8 @@ def optimize(
             with True or ``"relevant"``, then on in all dimensions of F with ``"feasible"``; see :func:`refine`.
         max_charts: See :func:`build_atlas`.
         max_seconds: See :func:`build_atlas`.
+        max_bytes: See :func:`build_atlas`.
+        threads: See :func:`build_atlas`.
         progress: See :func:`build_atlas`.
 
     Returns:
@@ -173,6 +147,8 @@ def optimize(
         epsilon=options["epsilon"],
         max_charts=max_charts,
         max_seconds=max_seconds,
+        max_bytes=max_bytes,
+        threads=threads,
         progress=progress,
     )
     start = time.perf_counter()

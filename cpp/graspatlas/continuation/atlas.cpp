@@ -1,17 +1,25 @@
 #include "graspatlas/continuation/atlas.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
+#include <numeric>
+#include <string>
+#include <thread>
 
-#include "graspatlas/continuation/chart.hpp"
+#include "graspatlas/parallel.hpp"
 
 namespace graspatlas {
 
 namespace {
 
-// A centre may miss a bound by rounding only.
-constexpr double kBoundTolerance = 1e-10;
+// Charts that one task may make: a chart with more to make comes again in the next generation.
+constexpr int kMostCharts = 64;
+// How often a thread looks whether it may go on before it goes to sleep.
+constexpr int kLooks = 100;
+// A generation of fewer charts keeps its own order, which packs charts best: threads would mostly wait for each other.
+constexpr int kSmall = 64;
+// In the order of a large one, a chart is far from so many before it, if one of so many to come is.
+constexpr int kFarFrom = 7, kChoices = 24;
 
 void check_options(const AtlasOptions& options, const System& system) {
   if (!(options.radius > 0.0)) throw Error("radius must be positive, got " + to_text(options.radius));
@@ -22,194 +30,234 @@ void check_options(const AtlasOptions& options, const System& system) {
     throw Error("epsilon must lie between 0 and 1, got " + to_text(options.epsilon));
 }
 
-// Half the width of a chart's box. It encloses the ball of the chart's radius, and on a line the box must be wider than
-// the ball so that it has ends outside.
-double half_width(int dimension, double radius) { return dimension == 1 ? 1.5 * radius : radius; }
+// 0 ... count - 1 in the order of their bits reversed: 0, 1/2, 1/4, 3/4, 1/8, ... of the way.
+std::vector<int> leaping_order(int count) {
+  int bits = 0;
+  while ((std::int64_t{1} << bits) < count) ++bits;
+  std::vector<int> order;
+  order.reserve(static_cast<std::size_t>(count));
+  for (std::int64_t i = 0; i < std::int64_t{1} << bits; ++i) {
+    std::int64_t reversed = 0;
+    for (int b = 0; b < bits; ++b) reversed |= (i >> b & 1) << (bits - 1 - b);
+    if (reversed < count) order.push_back(static_cast<int>(reversed));
+  }
+  return order;
+}
 
 }  // namespace
 
-Atlas::Atlas(System& system, const double* x0, const AtlasOptions& options)
+Atlas::Atlas(System& system, const double* x0, const AtlasOptions& options, int threads)
     : system_(system),
       options_(options),
-      x_size_(system.configuration_size()),
-      n_(system.tangent_size()),
-      k_(system.dimension()),
-      newton_(system, options.newton),
-      index_(system.embedding_size()),
-      centers_(x_size_),
-      bases_(k_ * n_),
-      x_new_(x0, x0 + x_size_),
-      Phi_new_(static_cast<std::size_t>(k_) * n_),
-      step_(n_),
-      displacement_(n_),
-      p_ij_(k_),
-      p_ji_(k_),
-      work_(2 * static_cast<std::size_t>(k_) * k_),
-      slack_(system.bound_count()),
-      bound_in_chart_(k_),
-      direction_(k_),
-      embedding_(system.embedding_size()) {
+      charts_(system.configuration_size(), system.dimension() * system.tangent_size(), system.embedding_size()) {
   check_options(options, system);
-  for (double value : x_new_)
-    if (!std::isfinite(value)) throw Error("x0 holds a number that is not finite");
+  for (int i = 0; i < system.configuration_size(); ++i)
+    if (!std::isfinite(x0[i])) throw Error("x0 holds a number that is not finite");
   system.check_point(x0);
-  ++projections_;
-  switch (newton_.project_freely(x_new_.data(), Phi_new_.data())) {
-    case Projection::converged:
-      break;
-    case Projection::singular:
-      throw Error(
-          "the Jacobian at x0 has lost rank: the equations are redundant there, so the solutions near x0 are "
-          "not a manifold of dimension " +
-          std::to_string(k_) + "; drop redundant equations or move x0");
-    case Projection::not_converged:
-      throw Error("x0 is not on the manifold and could not be projected onto it: residual " +
-                  to_text(newton_.residual()));
+  for (int i = 0; i < std::max(threads, 1); ++i) {
+    auto worker = std::make_unique<Worker>();
+    if (i > 0) worker->system = system.clone();
+    if (i > 0 && !worker->system) break;
+    worker->expander = std::make_unique<Expander>(i > 0 ? *worker->system : system, options, charts_);
+    workers_.push_back(std::move(worker));
   }
-  if (!inside_bounds(x_new_.data())) {
-    const auto worst = std::min_element(slack_.begin(), slack_.end()) - slack_.begin();
-    throw Error("x0, projected onto the manifold, breaks the " + system.bound_name(static_cast<int>(worst)) + " by " +
-                to_text(-slack_[worst]));
-  }
-  add_chart();
+  workers_[0]->expander->start(x0);
+  settle_order();
 }
 
-bool Atlas::inside_bounds(const double* x) {
-  if (slack_.empty()) return true;
-  system_.slack(x, slack_.data());
-  for (double s : slack_)
-    if (!(s >= -kBoundTolerance)) return false;
-  return true;
+std::int64_t Atlas::open_count() const {
+  return static_cast<std::int64_t>(turns_.size() - position_ + order_.size() - next_first_ + again_.size());
+}
+
+std::int64_t Atlas::projections() const {
+  std::int64_t sum = 0;
+  for (const auto& worker : workers_) sum += worker->expander->projections();
+  return sum;
+}
+
+std::int64_t Atlas::bytes() const {
+  std::int64_t sum = charts_.bytes() + static_cast<std::int64_t>(order_.capacity() * sizeof(int));
+  for (const auto& worker : workers_) sum += worker->expander->polytope_bytes() + worker->expander->list_bytes();
+  return sum;
+}
+
+std::int64_t Atlas::array_bytes() const {
+  // A centre, a basis and a residual; the polytopes; two numbers for each neighbour in a list.
+  const std::int64_t numbers = system_.configuration_size() + system_.dimension() * system_.tangent_size() + 1;
+  std::int64_t sum = count() * numbers * static_cast<std::int64_t>(sizeof(double));
+  for (const auto& worker : workers_) sum += worker->expander->polytope_bytes() + 2 * worker->expander->list_bytes();
+  return sum;
 }
 
 void Atlas::expand(std::int64_t chart_limit, double seconds) {
-  const auto start = std::chrono::steady_clock::now();
-  while (!open_.empty() && count() < chart_limit) {
-    const int i = open_.front();
-    const int vertex = polytopes_[i].expandable_vertex(options_.radius);
-    if (vertex < 0) {
-      open_.pop_front();
-      continue;
+  constexpr double kLongest = 1e6;
+  deadline_ = Clock::now() +
+              std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(std::min(seconds, kLongest)));
+  chart_limit_ = chart_limit;
+  made_ = count();
+  promised_ = 0;
+  stop_ = false;
+  try {
+    run_on_threads(threads(), [this](int worker) { work(*workers_[static_cast<std::size_t>(worker)]); });
+  } catch (...) {
+    settle_order();
+    throw;
+  }
+  settle_order();
+}
+
+void Atlas::work(Worker& worker) {
+  Task task;
+  while (take_task(worker, task)) {
+    int made = 0;
+    try {
+      made = worker.expander->expand(task.slot, static_cast<ChartKey>(task.number) * kMostCharts, task.most);
+    } catch (...) {
+      finish_task(worker, task, task.most);  // as if more were to be made
+      const std::lock_guard lock(mutex_);
+      stop_ = true;
+      changed_.notify_all();
+      helpers_wanted_.notify_all();
+      throw;
     }
-    expand_vertex(i, vertex);
-    if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > seconds) return;
+    finish_task(worker, task, made);
   }
 }
 
-void Atlas::expand_vertex(int i, int vertex) {
-  const double* v = polytopes_[i].vertex(vertex);
-  double norm = 0.0;
-  for (int c = 0; c < k_; ++c) norm += v[c] * v[c];
-  norm = std::sqrt(norm);
-  for (int c = 0; c < k_; ++c) direction_[c] = v[c] / norm;
-  vertex_.assign(v, v + k_);
-
-  Closed reason = Closed::open;
-  for (double alpha = options_.radius; alpha >= options_.smallest_step * options_.radius; alpha *= options_.shrink) {
-    reason = attempt(i, direction_.data(), alpha);
-    if (reason == Closed::open) {
-      add_chart();
-      // The new neighbour cuts the vertex off; should rounding keep it, it must not be expanded again.
-      for (int u = 0; u < polytopes_[i].vertex_count(); ++u)
-        if (std::equal(vertex_.begin(), vertex_.end(), polytopes_[i].vertex(u)))
-          polytopes_[i].close(u, static_cast<std::uint8_t>(Closed::curvature));
-      return;
-    }
+// Waits for what another thread does. Mostly that is a matter of microseconds, in which a thread is not worth stopping.
+template <class Condition>
+void Atlas::wait(Lock& lock, Condition condition) {
+  for (int i = 0; i < kLooks && !condition(); ++i) {
+    lock.unlock();
+    std::this_thread::yield();
+    lock.lock();
   }
-  polytopes_[i].close(vertex, static_cast<std::uint8_t>(reason));
+  changed_.wait(lock, condition);
 }
 
-// Projects a step of length alpha from chart i into x_new_, Phi_new_: eqs (14) to (18).
-Closed Atlas::attempt(int i, const double* direction, double alpha) {
-  const double* Phi = basis(i);
-  for (int c = 0; c < n_; ++c) {
-    double sum = 0.0;
-    for (int a = 0; a < k_; ++a) sum += Phi[static_cast<std::size_t>(a) * n_ + c] * direction[a];
-    step_[c] = alpha * sum;
+// Towards the limit of charts, tasks come one by one and with what is left, so that it is met exactly.
+bool Atlas::may_take() const {
+  if (stop_ || running_ == 0) return true;
+  return position_ < turns_.size() && chart_limit_ - made_ - promised_ >= kMostCharts;
+}
+
+// The next chart to expand, once that can begin; false when there is none, or the time is up.
+bool Atlas::take_task(Worker& worker, Task& task) {
+  Lock lock(mutex_);
+  const bool helper = &worker != workers_.front().get();
+  do {
+    if (helper) helpers_wanted_.wait(lock, [this] { return stop_ || !small(); });
+    wait(lock, [this, helper] { return may_take() || (helper && small()); });
+    if (stop_) return false;
+  } while (helper && small());
+  if ((position_ == turns_.size() && !next_generation(worker)) || made_ >= chart_limit_) {
+    stop_ = true;
+    changed_.notify_all();
+    helpers_wanted_.notify_all();
+    return false;
   }
-  system_.integrate(center(i), step_.data(), x_new_.data());
-  ++projections_;
-  if (newton_.project(x_new_.data(), Phi) != Projection::converged) return Closed::not_converged;
-  if (!inside_bounds(x_new_.data())) return Closed::bounds;
-  if (!newton_.tangent_basis(Phi_new_.data())) return Closed::not_converged;
-  if (!pass_tests(i, x_new_.data(), Phi_new_.data(), p_ij_.data(), p_ji_.data())) return Closed::curvature;
-  return Closed::open;
+  task.slot = generation_[static_cast<std::size_t>(turns_[position_++])];
+  task.most = static_cast<int>(std::min<std::int64_t>(kMostCharts, chart_limit_ - made_ - promised_));
+  task.number = ++task_count_;
+  promised_ += task.most;
+  ++running_;
+  find_conflicts(worker, task);
+  if (Clock::now() > deadline_) {
+    stop_ = true;  // but this task is done
+    helpers_wanted_.notify_all();
+  }
+  wait(lock, [&task] {
+    return std::none_of(task.before.begin(), task.before.end(),
+                        [](const auto& other) { return other.first->task == other.second; });
+  });
+  return true;
 }
 
-// Eqs (17) and (18) between chart i and a chart at x_j, and the images of each centre in the other's tangent space.
-// Eq (17) is a length, which may exceed a chart's own size: then charts on two sides of a fold would cut each other at
-// images far from the middle between them, and leave a gap. So the displacement between the centres, too, may differ
-// from either tangent space by no larger an angle than eq (18) allows between the spaces.
-bool Atlas::pass_tests(int i, const double* x_j, const double* Phi_j, double* p_ij, double* p_ji) {
-  system_.difference(center(i), x_j, displacement_.data());
-  double squared = 0.0;
-  for (int c = 0; c < n_; ++c) squared += displacement_[c] * displacement_[c];
-  if (squared > 4.0 * options_.radius * options_.radius) return false;
-  const double cosine = 1.0 - options_.epsilon;
-  const double limit = std::min(options_.epsilon * options_.epsilon, (1.0 - cosine * cosine) * squared);
-  if (project_displacement(basis(i), displacement_.data(), k_, n_, p_ij) > limit) return false;
-  if (project_displacement(Phi_j, displacement_.data(), k_, n_, p_ji) > limit) return false;
-  for (int a = 0; a < k_; ++a) p_ji[a] = -p_ji[a];
-  return tangent_spaces_agree(basis(i), Phi_j, k_, n_, cosine, work_.data());
+// The tasks of others that are too near, and the place of this one, for those to come.
+void Atlas::find_conflicts(Worker& worker, Task& task) {
+  const double* embedding = worker.expander->embedding_of(task.slot);
+  const double distance = kIndependent * options_.radius;
+  task.before.clear();
+  for (const auto& other : workers_)
+    if (other->task != 0 &&
+        is_within(embedding, other->embedding.data(), system_.embedding_size(), distance * distance))
+      task.before.emplace_back(other.get(), other->task);
+  worker.embedding.assign(embedding, embedding + system_.embedding_size());
+  worker.task = task.number;
 }
 
-int Atlas::add_chart() {
-  const int j = static_cast<int>(count());
-  std::copy(x_new_.begin(), x_new_.end(), centers_.add());
-  std::copy(Phi_new_.begin(), Phi_new_.end(), bases_.add());
-  residuals_.push_back(newton_.residual());
-  polytopes_.emplace_back(k_, half_width(k_, options_.radius));
-  cut_by_bounds(j);
-  meet_neighbours(j);
-  open_.push_back(j);
-  return j;
+void Atlas::finish_task(Worker& worker, const Task& task, int made) {
+  const std::lock_guard lock(mutex_);
+  made_ += made;
+  promised_ -= task.most;
+  --running_;
+  if (made >= task.most) {
+    if (task.most < kMostCharts)
+      --position_;  // it was the last: it goes on where it stopped
+    else
+      again_.push_back(task.slot);
+  }
+  worker.task = 0;
+  changed_.notify_all();
 }
 
-void Atlas::cut_by_bounds(int i) {
-  if (slack_.empty()) return;
-  system_.slack(center(i), slack_.data());
-  const RowMatrix& B = system_.bound_normals();
-  for (int b = 0; b < system_.bound_count(); ++b) {
-    double squared = 0.0;
-    for (int a = 0; a < k_; ++a) {
-      const double* row = basis(i) + static_cast<std::size_t>(a) * n_;
-      double dot = 0.0;
-      for (int c = 0; c < n_; ++c) dot += B(b, c) * row[c];
-      bound_in_chart_[a] = dot;
-      squared += dot * dot;
+// All charts that are new, in their order, and those that were not done. False when there is none.
+bool Atlas::next_generation(Worker& worker) {
+  settle_order();
+  std::sort(again_.begin(), again_.end(), [this](int a, int b) { return charts_[a].key < charts_[b].key; });
+  generation_ = again_;
+  generation_.insert(generation_.end(), order_.begin() + static_cast<std::ptrdiff_t>(next_first_), order_.end());
+  next_first_ = order_.size();
+  again_.clear();
+  choose_order(worker);
+  position_ = 0;
+  if (!small()) helpers_wanted_.notify_all();
+  return !generation_.empty();
+}
+
+bool Atlas::small() const { return static_cast<int>(generation_.size()) < kSmall; }
+
+// The order in which the generation is expanded: it depends on the charts only.
+void Atlas::choose_order(Worker& worker) {
+  const int count = static_cast<int>(generation_.size()), size = system_.embedding_size();
+  turns_.resize(generation_.size());
+  std::iota(turns_.begin(), turns_.end(), 0);
+  if (small()) return;
+  std::vector<double> embeddings(generation_.size() * static_cast<std::size_t>(size));
+  for (std::size_t i = 0; i < generation_.size(); ++i)
+    std::copy_n(worker.expander->embedding_of(generation_[i]), size, &embeddings[i * size]);
+  const double distance = kIndependent * options_.radius;
+  const auto near = [&](int i, int j) {
+    return is_within(&embeddings[static_cast<std::size_t>(i) * size], &embeddings[static_cast<std::size_t>(j) * size],
+                     size, distance * distance);
+  };
+  const std::vector<int> leaps = leaping_order(count);
+  std::vector<int> choices;
+  for (int turn = 0, next = 0; turn < count; ++turn) {
+    while (next < count && static_cast<int>(choices.size()) < kChoices) choices.push_back(leaps[next++]);
+    // The choice that is far from the most charts just before it.
+    const int most = std::min(turn, kFarFrom);
+    int best = 0, best_far = -1;
+    for (int c = 0; c < static_cast<int>(choices.size()) && best_far < most; ++c) {
+      int far = 0;
+      while (far < most && !near(choices[c], turns_[turn - 1 - far])) ++far;
+      if (far > best_far) {
+        best = c;
+        best_far = far;
+      }
     }
-    const double slack = std::max(slack_[b], 0.0);
-    // The box reaches sqrt(k) r from the centre: a bound farther away cuts nothing.
-    if (slack * slack >= squared * k_ * options_.radius * options_.radius) continue;
-    const double norm = std::sqrt(squared);
-    for (int a = 0; a < k_; ++a) bound_in_chart_[a] /= norm;
-    polytopes_[i].cut(bound_in_chart_.data(), slack / norm, Polytope::bound_tag(b));
+    turns_[turn] = choices[best];
+    choices.erase(choices.begin() + best);
   }
 }
 
-// Eq (16) and Fig. 6b: two charts of equal radius cut each other at the bisector of the centre and the
-// other's image.
-void Atlas::meet_neighbours(int j) {
-  system_.embed(center(j), embedding_.data());
-  index_.within(embedding_.data(), 2.0 * options_.radius, near_);
-  index_.insert(embedding_.data());
-  for (int i : near_) {
-    if (!pass_tests(i, center(j), basis(j), p_ij_.data(), p_ji_.data())) continue;
-    double squared_ij = 0.0, squared_ji = 0.0;
-    for (int a = 0; a < k_; ++a) {
-      squared_ij += p_ij_[a] * p_ij_[a];
-      squared_ji += p_ji_[a] * p_ji_[a];
-    }
-    if (!(squared_ij > 0.0) || !(squared_ji > 0.0)) continue;
-    const double norm_ij = std::sqrt(squared_ij), norm_ji = std::sqrt(squared_ji);
-    for (int a = 0; a < k_; ++a) {
-      p_ij_[a] /= norm_ij;
-      p_ji_[a] /= norm_ji;
-    }
-    polytopes_[i].cut(p_ij_.data(), 0.5 * norm_ij, j);
-    polytopes_[j].cut(p_ji_.data(), 0.5 * norm_ji, i);
-    pairs_.push_back({i, j});
-  }
+// Numbers the charts that have come; no task may be running.
+void Atlas::settle_order() {
+  const auto first = static_cast<std::ptrdiff_t>(order_.size());
+  for (int slot = static_cast<int>(first); slot < charts_.count(); ++slot) order_.push_back(slot);
+  std::sort(order_.begin() + first, order_.end(), [this](int a, int b) { return charts_[a].key < charts_[b].key; });
+  for (std::size_t i = static_cast<std::size_t>(first); i < order_.size(); ++i)
+    charts_[order_[i]].number = static_cast<int>(i);
 }
 
 }  // namespace graspatlas

@@ -1,28 +1,17 @@
 #pragma once
 
-#include <array>
+#include <chrono>
+#include <condition_variable>
 #include <cstdint>
-#include <deque>
+#include <memory>
+#include <mutex>
 #include <vector>
 
-#include "graspatlas/continuation/neighbours.hpp"
-#include "graspatlas/continuation/newton.hpp"
-#include "graspatlas/continuation/polytope.hpp"
-#include "graspatlas/continuation/rows.hpp"
+#include "graspatlas/continuation/charts.hpp"
+#include "graspatlas/continuation/expander.hpp"
 #include "graspatlas/continuation/system.hpp"
 
 namespace graspatlas {
-
-struct AtlasOptions {
-  double radius = 0.1;   ///< r: radius of the ball that a chart may cover [units of the tangent space]
-  double epsilon = 0.1;  ///< eqs (17) and (18): how far and how different neighbouring charts may be
-  NewtonOptions newton;
-  double shrink = 0.9;          ///< alpha is multiplied by this after each failed attempt (Algorithm 1, line 11)
-  double smallest_step = 0.05;  ///< a vertex is closed when alpha falls below this share of the radius
-};
-
-/// Why a vertex could not be expanded. Zero means that it may still be.
-enum class Closed : std::uint8_t { open = 0, bounds = 1, curvature = 2, not_converged = 3 };
 
 /// An atlas of the connected part of R(x) = 0 that contains a first point: Algorithm 1, lines 4 to 13.
 ///
@@ -30,56 +19,90 @@ enum class Closed : std::uint8_t { open = 0, bounds = 1, curvature = 2, not_conv
 /// is at most epsilon off either tangent space, and its cosine with either is at least 1 - epsilon; the tangent spaces
 /// agree to 1 - epsilon; and each polytope lies in the half-space nearer to its own centre than to the other's, both
 /// seen in its own tangent space.
+///
+/// The charts that are open at one time are a generation; the charts made from them are the next. A small generation is
+/// expanded in its own order by one thread. A large one is expanded in an order that leaps about its front, so that
+/// charts next to each other in the order are mostly far apart. Threads take charts in this order, and a thread waits
+/// while an earlier chart is being expanded that is too near (kIndependent) for the two to leave each other's charts
+/// alone. So the atlas is the one that a single thread would make, to the bit.
 class Atlas {
  public:
   /// Starts with one chart at the point of the manifold nearest x0.
   /// Throws when x0 cannot be projected, breaks a bound, or the Jacobian there is rank deficient.
-  Atlas(System& system, const double* x0, const AtlasOptions& options);
+  /// A system that cannot be cloned is left to one thread.
+  Atlas(System& system, const double* x0, const AtlasOptions& options, int threads = 1);
 
   /// Expand until the atlas is complete, has `chart_limit` charts, or `seconds` have passed.
   void expand(std::int64_t chart_limit, double seconds);
 
-  bool complete() const { return open_.empty(); }
-  std::int64_t open_count() const { return static_cast<std::int64_t>(open_.size()); }
-  std::int64_t count() const { return static_cast<std::int64_t>(polytopes_.size()); }
+  bool complete() const { return open_count() == 0; }
+  /// Charts that were not expanded yet.
+  std::int64_t open_count() const;
+  std::int64_t count() const { return static_cast<std::int64_t>(order_.size()); }
+  int threads() const { return static_cast<int>(workers_.size()); }
 
-  const double* center(std::int64_t i) const { return centers_[static_cast<std::size_t>(i)]; }
-  const double* basis(std::int64_t i) const { return bases_[static_cast<std::size_t>(i)]; }
-  double residual(std::int64_t i) const { return residuals_[i]; }
-  const Polytope& polytope(std::int64_t i) const { return polytopes_[i]; }
-  /// Pairs (i, j), i < j, of charts that cut each other, in the order in which they met.
-  const std::vector<std::array<int, 2>>& neighbour_pairs() const { return pairs_; }
+  const double* center(std::int64_t i) const { return charts_.center(order_[i]); }
+  const double* basis(std::int64_t i) const { return charts_.basis(order_[i]); }
+  /// Its facets and neighbours name slots; `number` tells which charts these are.
+  const Chart& chart(std::int64_t i) const { return charts_[order_[i]]; }
+  int number(int slot) const { return charts_[slot].number; }
+
   /// Newton projections made so far, those of failed attempts included.
-  std::int64_t projections() const { return projections_; }
+  std::int64_t projections() const;
+  /// Memory that the atlas holds.
+  std::int64_t bytes() const;
+  /// Memory that the numbers of all its charts take at most when they are copied.
+  std::int64_t array_bytes() const;
 
   const System& system() const { return system_; }
-  const AtlasOptions& options() const { return options_; }
 
  private:
-  Closed attempt(int i, const double* direction, double alpha);
-  void expand_vertex(int i, int vertex);
-  int add_chart();
-  void cut_by_bounds(int i);
-  void meet_neighbours(int i);
-  bool pass_tests(int i, const double* x_j, const double* Phi_j, double* p_ij, double* p_ji);
-  bool inside_bounds(const double* x);
+  using Clock = std::chrono::steady_clock;
+
+  struct Worker {
+    std::unique_ptr<System> system;  // its own, but for the first worker
+    std::unique_ptr<Expander> expander;
+    std::int64_t task = 0;          // number of the one that it is at; 0: none
+    std::vector<double> embedding;  // of the chart being expanded
+  };
+  struct Task {
+    std::int64_t number;
+    int slot, most;
+    std::vector<std::pair<const Worker*, std::int64_t>> before;  // what must be done first
+  };
+  using Lock = std::unique_lock<std::mutex>;
+
+  void work(Worker& worker);
+  bool take_task(Worker& worker, Task& task);
+  void find_conflicts(Worker& worker, Task& task);
+  void finish_task(Worker& worker, const Task& task, int made);
+  bool may_take() const;
+  bool next_generation(Worker& worker);
+  void choose_order(Worker& worker);
+  void settle_order();
+  template <class Condition>
+  void wait(Lock& lock, Condition condition);
+  bool small() const;
 
   System& system_;
   AtlasOptions options_;
-  int x_size_, n_, k_;
-  Newton newton_;
-  Neighbours index_;
-  Rows centers_, bases_;
-  std::vector<double> residuals_;
-  std::deque<Polytope> polytopes_;
-  std::vector<std::array<int, 2>> pairs_;
-  std::deque<int> open_;
-  std::int64_t projections_ = 0;
+  Charts charts_;
+  std::vector<std::unique_ptr<Worker>> workers_;
+  std::vector<int> order_;  // slots in the order of the algorithm
 
-  // Scratch: the candidate chart, and work space of the tests.
-  std::vector<double> x_new_, Phi_new_, step_, displacement_, p_ij_, p_ji_, work_, slack_, bound_in_chart_, direction_,
-      vertex_, embedding_;
-  std::vector<int> near_;
+  std::vector<int> generation_, turns_;  // slots of the charts to expand, and the order to take them in
+  std::size_t position_ = 0;             // in turns_
+  std::size_t next_first_ = 0;           // in order_: where the next generation begins
+  std::vector<int> again_;               // charts that made as many as one task may and are not done
+  std::int64_t task_count_ = 0;
+
+  // State of one call of expand, guarded by mutex_.
+  std::mutex mutex_;
+  std::condition_variable changed_, helpers_wanted_;
+  std::int64_t chart_limit_ = 0, made_ = 0, promised_ = 0;  // charts that tasks have made, and may still make
+  int running_ = 0;
+  bool stop_ = false;
+  Clock::time_point deadline_;
 };
 
 }  // namespace graspatlas

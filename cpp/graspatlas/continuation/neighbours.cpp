@@ -34,8 +34,8 @@ int Neighbours::new_bucket() {
   return bucket;
 }
 
-void Neighbours::insert(const double* point) {
-  const int number = count_++;
+void Neighbours::insert(const double* point, int number) {
+  ++count_;
   if (root_ < 0) {
     root_ = new_node();
     nodes_[root_].bucket = new_bucket();
@@ -66,7 +66,7 @@ void Neighbours::insert(const double* point) {
     ++leaf.count;
     return;
   }
-  const int replacement = rebuild(lopsided, point);
+  const int replacement = rebuild(lopsided, point, number);
   if (lopsided_parent < 0)
     root_ = replacement;
   else
@@ -74,28 +74,29 @@ void Neighbours::insert(const double* point) {
         replacement;
 }
 
-int Neighbours::rebuild(int node, const double* point) {
-  std::vector<int> numbers;
-  std::vector<double> points;
-  collect(node, numbers, points);
-  numbers.push_back(count_ - 1);
-  points.insert(points.end(), point, point + size_);
-  std::vector<Item> items(numbers.size());
-  for (std::size_t i = 0; i < items.size(); ++i) items[i] = {numbers[i], &points[i * size_]};
-  return build(items.data(), items.data() + items.size());
+int Neighbours::rebuild(int node, const double* point, int number) {
+  collected_numbers_.clear();
+  collected_points_.clear();
+  collect(node);
+  collected_numbers_.push_back(number);
+  collected_points_.insert(collected_points_.end(), point, point + size_);
+  items_.resize(collected_numbers_.size());
+  for (std::size_t i = 0; i < items_.size(); ++i) items_[i] = {collected_numbers_[i], &collected_points_[i * size_]};
+  return build(items_.data(), items_.data() + items_.size());
 }
 
-void Neighbours::collect(int node, std::vector<int>& numbers, std::vector<double>& points) {
+void Neighbours::collect(int node) {
   const Node n = nodes_[node];
   if (n.axis < 0) {
     for (int i = 0; i < n.count; ++i) {
-      numbers.push_back(numbers_[static_cast<std::size_t>(n.bucket) * kBucket + i]);
-      points.insert(points.end(), bucket_point(n.bucket, i), bucket_point(n.bucket, i) + size_);
+      const double* point = bucket_point(n.bucket, i);
+      collected_numbers_.push_back(numbers_[static_cast<std::size_t>(n.bucket) * kBucket + i]);
+      collected_points_.insert(collected_points_.end(), point, point + size_);
     }
     free_buckets_.push_back(n.bucket);
   } else {
-    collect(n.left, numbers, points);
-    collect(n.right, numbers, points);
+    collect(n.left);
+    collect(n.right);
   }
   free_nodes_.push_back(node);
 }
@@ -139,25 +140,20 @@ int Neighbours::build(Item* first, Item* last) {
   return node;
 }
 
-void Neighbours::within(const double* point, double distance, std::vector<int>& out) const {
+void Neighbours::within(const double* point, double distance, std::vector<int>& out, Scratch& scratch) const {
   out.clear();
   if (root_ < 0) return;
-  thread_local std::vector<double> offsets;
-  offsets.assign(size_, 0.0);
-  search(root_, point, 0.0, offsets, distance * distance, out);
-  std::sort(out.begin(), out.end());
+  scratch.assign(size_, 0.0);
+  search(root_, point, 0.0, scratch.data(), distance * distance, out);
 }
 
-void Neighbours::search(int node, const double* point, double squared_to_cell, std::vector<double>& offsets,
-                        double squared, std::vector<int>& out) const {
+void Neighbours::search(int node, const double* point, double squared_to_cell, double* offsets, double squared,
+                        std::vector<int>& out) const {
   const Node& n = nodes_[node];
   if (n.axis < 0) {
-    for (int i = 0; i < n.count; ++i) {
-      const double* other = bucket_point(n.bucket, i);
-      double sum = 0.0;
-      for (int c = 0; c < size_; ++c) sum += (other[c] - point[c]) * (other[c] - point[c]);
-      if (sum <= squared) out.push_back(numbers_[static_cast<std::size_t>(n.bucket) * kBucket + i]);
-    }
+    for (int i = 0; i < n.count; ++i)
+      if (is_within(bucket_point(n.bucket, i), point, size_, squared))
+        out.push_back(numbers_[static_cast<std::size_t>(n.bucket) * kBucket + i]);
     return;
   }
   // Points equal to the split may lie on either side, so both sides are visited when the offset is zero.
@@ -169,6 +165,11 @@ void Neighbours::search(int node, const double* point, double squared_to_cell, s
   offsets[n.axis] = offset;
   search(offset < 0.0 ? n.right : n.left, point, farther, offsets, squared, out);
   offsets[n.axis] = old;
+}
+
+std::int64_t Neighbours::bytes() const {
+  const auto numbers = static_cast<std::int64_t>(numbers_.capacity() * sizeof(int));
+  return static_cast<std::int64_t>(buckets_.bytes() + nodes_.capacity() * sizeof(Node)) + numbers;
 }
 
 }  // namespace graspatlas

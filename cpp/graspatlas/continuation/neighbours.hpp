@@ -7,6 +7,19 @@
 
 namespace graspatlas {
 
+/// True when the squared distance between points a and b [size] is at most `squared`; mostly found out from some of
+/// their numbers.
+inline bool is_within(const double* a, const double* b, int size, double squared) {
+  double sum = 0.0;
+  int c = 0;
+  for (; c + 4 <= size; c += 4) {
+    for (int i = c; i < c + 4; ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
+    if (sum > squared) return false;
+  }
+  for (; c < size; ++c) sum += (a[c] - b[c]) * (a[c] - b[c]);
+  return sum <= squared;
+}
+
 /// Points of R^size that come one by one, and those within a distance of any point.
 ///
 /// A k-d tree with buckets. A subtree that has grown lopsided is rebuilt, so the depth stays logarithmic
@@ -16,14 +29,19 @@ class Neighbours {
  public:
   explicit Neighbours(int size);
 
-  /// Add a point [size]; points are numbered 0, 1, 2, ... as they come.
-  void insert(const double* point);
+  /// Work space of `within`, one for each thread.
+  using Scratch = std::vector<double>;
 
-  /// Numbers of all points within `distance` of `point`, ascending, into `out`.
-  void within(const double* point, double distance, std::vector<int>& out) const;
+  /// Add a point [size] under a number of the caller's.
+  void insert(const double* point, int number);
+
+  /// Numbers of all points within `distance` of `point`, in no order, into `out`.
+  void within(const double* point, double distance, std::vector<int>& out, Scratch& scratch) const;
 
   int size() const { return size_; }
   int count() const { return count_; }
+  /// Memory that it holds.
+  std::int64_t bytes() const;
 
  private:
   static constexpr int kBucket = 16;  // points in a leaf
@@ -45,16 +63,20 @@ class Neighbours {
   int new_node();
   int new_bucket();
   int build(Item* first, Item* last);
-  int rebuild(int node, const double* point);
-  void collect(int node, std::vector<int>& numbers, std::vector<double>& points);
-  void search(int node, const double* point, double squared_to_cell, std::vector<double>& offsets, double squared,
+  int rebuild(int node, const double* point, int number);
+  void collect(int node);
+  void search(int node, const double* point, double squared_to_cell, double* offsets, double squared,
               std::vector<int>& out) const;
 
   int size_, count_ = 0, root_ = -1;
   std::vector<Node> nodes_;
-  Rows buckets_;              // a bucket is a row: kBucket points [size]
+  Rows<double> buckets_;      // a bucket is a row: kBucket points [size]
   std::vector<int> numbers_;  // of the buckets, kBucket each
   std::vector<int> free_nodes_, free_buckets_;
+  // What a rebuild collects; kept, because leaves are split all the time.
+  std::vector<int> collected_numbers_;
+  std::vector<double> collected_points_;
+  std::vector<Item> items_;
 };
 
 }  // namespace graspatlas

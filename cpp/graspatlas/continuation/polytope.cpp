@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
+#include <string>
 
 #include "graspatlas/continuation/system.hpp"
 
@@ -31,151 +33,251 @@ bool share_edge(const std::uint16_t* a, const std::uint16_t* b, int k, std::uint
   return count == k - 1;
 }
 
-// The same from the bits of the facets that both vertices have.
-inline bool share_edge(std::uint64_t common, int k, std::uint16_t* shared) {
-  for (int i = 0; i < k - 1; ++i) {
-    if (common == 0) return false;
-    shared[i] = static_cast<std::uint16_t>(__builtin_ctzll(common));
-    common &= common - 1;
-  }
-  return true;
+// True when at least `count` bits are set.
+inline bool has_bits(std::uint64_t bits, int count) {
+  for (int i = 1; i < count; ++i) bits &= bits - 1;
+  return count == 0 || bits != 0;
 }
 
-// Scratch of `cut`, one for each thread: no allocation once it has grown.
-struct Scratch {
-  std::vector<double> signed_distance;
-  std::vector<std::uint16_t> shared_facets;
-  std::vector<int> inside, outside;
-};
-thread_local Scratch thread_scratch;
+inline void list_bits(std::uint64_t bits, int count, std::uint16_t* out) {
+  for (int i = 0; i < count; ++i) {
+    out[i] = static_cast<std::uint16_t>(__builtin_ctzll(bits));
+    bits &= bits - 1;
+  }
+}
 
 }  // namespace
 
-Polytope::Polytope(int dimension, double half_width) : k_(dimension) {
+Polytope::Polytope(int dimension, double half_width) {
   if (dimension < 1 || dimension > 12)
     throw Error("polytopes have 1 to 12 dimensions, not " + std::to_string(dimension));
-  normals_.assign(2 * static_cast<std::size_t>(k_) * k_, 0.0);
-  for (int f = 0; f < 2 * k_; ++f) normals_[static_cast<std::size_t>(f) * k_ + f / 2] = f % 2 ? 1.0 : -1.0;
-  offsets_.assign(2 * k_, half_width);
-  tags_.assign(2 * k_, kBox);
-  const int corners = 1 << k_;
-  uses_.assign(2 * k_, corners / 2);
-  state_.assign(corners, 0);
-  for (int corner = 0; corner < corners; ++corner) {
-    std::uint64_t mask = 0;
-    for (int axis = 0; axis < k_; ++axis) {
-      const int side = corner >> axis & 1, facet = 2 * axis + side;
-      vertices_.push_back(side ? half_width : -half_width);
-      facets_.push_back(static_cast<FacetIndex>(facet));
-      mask |= std::uint64_t{1} << facet;
-    }
-    masks_.push_back(mask);
+  reset(dimension, half_width);
+}
+
+void Polytope::reset(int dimension, double half_width) {
+  const int corners = 1 << dimension;
+  if (dimension != k_ || vertex_capacity_ < corners || facet_capacity_ < 2 * dimension) {
+    vertex_count_ = facet_count_ = 0;
+    k_ = dimension;
+    resize(corners, 2 * dimension);
   }
+  vertex_count_ = corners;
+  facet_count_ = 2 * k_;
+  std::fill_n(normals(), 2 * k_ * k_, 0.0);
+  for (int f = 0; f < 2 * k_; ++f) normals()[f * k_ + f / 2] = f % 2 ? 1.0 : -1.0;
+  std::fill_n(offsets(), 2 * k_, half_width);
+  std::fill_n(tags(), 2 * k_, kBox);
+  std::fill_n(uses(), 2 * k_, corners / 2);
+  std::fill_n(states(), corners, std::uint8_t{0});
+  double* position = vertices();
+  FacetIndex* facet = facets();
+  for (int corner = 0; corner < corners; ++corner)
+    for (int axis = 0; axis < k_; ++axis) {
+      const int side = corner >> axis & 1;
+      *position++ = side ? half_width : -half_width;
+      *facet++ = static_cast<FacetIndex>(2 * axis + side);
+    }
+}
+
+Polytope::Polytope(const Polytope& other) { *this = other; }
+
+Polytope& Polytope::operator=(const Polytope& other) {
+  if (this == &other) return *this;
+  storage_.reset();
+  k_ = other.k_;
+  vertex_count_ = facet_count_ = 0;
+  resize(other.vertex_count_, other.facet_count_);
+  vertex_count_ = other.vertex_count_;
+  facet_count_ = other.facet_count_;
+  std::copy_n(other.vertices(), vertex_count_ * k_, vertices());
+  std::copy_n(other.normals(), facet_count_ * k_, normals());
+  std::copy_n(other.offsets(), facet_count_, offsets());
+  std::copy_n(other.tags(), facet_count_, tags());
+  std::copy_n(other.uses(), facet_count_, uses());
+  std::copy_n(other.facets(), vertex_count_ * k_, facets());
+  std::copy_n(other.states(), vertex_count_, states());
+  return *this;
+}
+
+// Moves the arrays to storage for so many vertices and facets.
+void Polytope::resize(int vertex_capacity, int facet_capacity) {
+  Polytope old;
+  std::swap(old.storage_, storage_);
+  old.k_ = k_;
+  old.vertex_capacity_ = vertex_capacity_;
+  old.facet_capacity_ = facet_capacity_;
+  storage_.reset(new std::byte[static_cast<std::size_t>(bytes(k_, vertex_capacity, facet_capacity))]);
+  vertex_capacity_ = vertex_capacity;
+  facet_capacity_ = facet_capacity;
+  if (!old.storage_) return;
+  std::copy_n(old.vertices(), vertex_count_ * k_, vertices());
+  std::copy_n(old.normals(), facet_count_ * k_, normals());
+  std::copy_n(old.offsets(), facet_count_, offsets());
+  std::copy_n(old.tags(), facet_count_, tags());
+  std::copy_n(old.uses(), facet_count_, uses());
+  std::copy_n(old.facets(), vertex_count_ * k_, facets());
+  std::copy_n(old.states(), vertex_count_, states());
 }
 
 int Polytope::new_facet(const double* normal, double offset, int tag) {
   int slot = 0;
-  while (slot < facet_slots() && uses_[slot] > 0) ++slot;
-  if (slot == facet_slots()) {
+  while (slot < facet_count_ && uses()[slot] > 0) ++slot;
+  if (slot == facet_count_) {
     if (slot > std::numeric_limits<FacetIndex>::max()) throw Error("a polytope has too many facets");
-    normals_.insert(normals_.end(), normal, normal + k_);
-    offsets_.push_back(offset);
-    tags_.push_back(tag);
-    uses_.push_back(0);
-  } else {
-    std::copy_n(normal, k_, &normals_[static_cast<std::size_t>(slot) * k_]);
-    offsets_[slot] = offset;
-    tags_[slot] = tag;
+    if (facet_count_ == facet_capacity_) resize(vertex_capacity_, facet_capacity_ + 2 + facet_capacity_ / 8);
+    uses()[facet_count_++] = 0;
   }
+  std::copy_n(normal, k_, normals() + static_cast<std::ptrdiff_t>(slot) * k_);
+  offsets()[slot] = offset;
+  tags()[slot] = tag;
   return slot;
 }
 
-bool Polytope::cut(const double* normal, double offset, int tag) {
-  Scratch& scratch = thread_scratch;
-  const int count = vertex_count();
-  scratch.signed_distance.resize(count);
-  scratch.shared_facets.resize(k_);
-  double* signed_distance = scratch.signed_distance.data();
-  std::uint16_t* shared = scratch.shared_facets.data();
-  const double tolerance = kOnPlane * (offset + 1.0);
-  int outside_count = 0;
-  for (int i = 0; i < count; ++i) {
-    double s = -offset;
-    for (int c = 0; c < k_; ++c) s += normal[c] * vertex(i)[c];
-    signed_distance[i] = s > tolerance ? s : std::min(s, 0.0);
-    outside_count += s > tolerance;
+bool Polytope::cut(const double* normal, double offset, int tag, Scratch& scratch) {
+  switch (k_) {
+    case 2:
+      return cut_in<2>(normal, offset, tag, scratch);
+    case 3:
+      return cut_in<3>(normal, offset, tag, scratch);
+    case 4:
+      return cut_in<4>(normal, offset, tag, scratch);
+    default:
+      return cut_in<0>(normal, offset, tag, scratch);
   }
-  if (outside_count == 0 || outside_count == count) return false;
+}
 
-  scratch.inside.clear();
-  scratch.outside.clear();
-  for (int i = 0; i < count; ++i) (signed_distance[i] > 0.0 ? scratch.outside : scratch.inside).push_back(i);
+// K is the dimension where the compiler may know it, else 0.
+template <int K>
+bool Polytope::cut_in(const double* normal, double offset, int tag, Scratch& scratch) {
+  const int k = K > 0 ? K : k_, count = vertex_count_;
+  if (static_cast<int>(scratch.signed_distance.size()) < count) {
+    scratch.signed_distance.resize(count);
+    scratch.masks.resize(count);
+    scratch.inside.resize(count);
+    scratch.outside.resize(count);
+  }
+  double* signed_distance = scratch.signed_distance.data();
+  const double tolerance = kOnPlane * (offset + 1.0);
+  const double* u = vertices();
+  double farthest = -offset;
+  for (int i = 0; i < count; ++i, u += k) {
+    double s = -offset;
+    for (int c = 0; c < k; ++c) s += normal[c] * u[c];
+    signed_distance[i] = s;
+    farthest = std::max(farthest, s);
+  }
+  if (!(farthest > tolerance)) return false;
+  int &inside_count = scratch.inside_count = 0, &outside_count = scratch.outside_count = 0;
+  for (int i = 0; i < count; ++i) {
+    const bool out = signed_distance[i] > tolerance;
+    scratch.inside[inside_count] = i;
+    scratch.outside[outside_count] = i;
+    inside_count += !out;
+    outside_count += out;
+    if (!out) signed_distance[i] = std::min(signed_distance[i], 0.0);
+  }
+  if (inside_count == 0) return false;
   const int facet = new_facet(normal, offset, tag);
-  const bool masks_hold = facet_slots() <= kMaskBits;
-  for (const int out : scratch.outside)
-    for (const int in : scratch.inside) {
-      const bool edge = masks_hold ? share_edge(masks_[in] & masks_[out], k_, shared)
-                                   : share_edge(facets_at(in), facets_at(out), k_, shared);
-      if (!edge) continue;
-      const double fraction = signed_distance[in] / (signed_distance[in] - signed_distance[out]);
-      add_vertex_on_edge(in, out, fraction, shared, facet);
-    }
-  for (const int out : scratch.outside)
-    for (int c = 0; c < k_; ++c) --uses_[facets_at(out)[c]];
-  fill_gaps(scratch.outside);
+  replace(find_new_vertices<K>(facet, scratch), scratch);
   return true;
 }
 
-void Polytope::add_vertex_on_edge(int inside, int outside, double fraction, const FacetIndex* shared, int facet) {
-  const std::size_t start = vertices_.size();
-  vertices_.resize(start + k_);
-  const double *a = vertex(inside), *b = vertex(outside);
-  for (int c = 0; c < k_; ++c) vertices_[start + c] = a[c] + fraction * (b[c] - a[c]);
-  facets_.resize(start + k_);
-  FacetIndex* row = &facets_[start];
-  const auto added = static_cast<FacetIndex>(facet);
-  int i = 0;
-  for (; i < k_ - 1 && shared[i] < added; ++i) row[i] = shared[i];
-  row[i] = added;
-  for (; i < k_ - 1; ++i) row[i + 1] = shared[i];
-  std::uint64_t mask = 0;
-  for (int c = 0; c < k_; ++c) {
-    ++uses_[row[c]];
-    mask |= std::uint64_t{1} << (row[c] % kMaskBits);
+// Where the half-space cuts edges: positions and facets into scratch; their number.
+template <int K>
+int Polytope::find_new_vertices(int facet, Scratch& scratch) {
+  const int k = K > 0 ? K : k_;
+  const FacetIndex* rows = facets();
+  const bool masks_hold = facet_count_ <= kMaskBits;
+  scratch.shared.resize(k);
+  FacetIndex* shared = scratch.shared.data();
+  std::uint64_t* masks = scratch.masks.data();
+  if (masks_hold) {
+    for (int i = 0; i < vertex_count_; ++i) {
+      std::uint64_t mask = 0;
+      for (int c = 0; c < k; ++c) mask |= std::uint64_t{1} << rows[i * k + c];
+      masks[i] = mask;
+    }
+    // An inside vertex on an edge to an outside one shares k - 1 facets with the outside ones altogether.
+    std::uint64_t all = 0;
+    for (int o = 0; o < scratch.outside_count; ++o) all |= masks[scratch.outside[o]];
+    int kept = 0;
+    for (int i = 0; i < scratch.inside_count; ++i) {
+      const int in = scratch.inside[i];
+      scratch.inside[kept] = in;
+      kept += has_bits(masks[in] & all, k - 1);
+    }
+    scratch.inside_count = kept;
   }
-  masks_.push_back(mask);
-  state_.push_back(0);
+  int found = 0;
+  scratch.vertices.clear();
+  scratch.facets.clear();
+  for (int o = 0; o < scratch.outside_count; ++o)
+    for (int n = 0; n < scratch.inside_count; ++n) {
+      const int out = scratch.outside[o], in = scratch.inside[n];
+      if (masks_hold) {
+        const std::uint64_t common = masks[in] & masks[out];
+        if (!has_bits(common, k - 1)) continue;
+        list_bits(common, k - 1, shared);
+      } else if (!share_edge(rows + static_cast<std::ptrdiff_t>(in) * k, rows + static_cast<std::ptrdiff_t>(out) * k, k,
+                             shared)) {
+        continue;
+      }
+      const double fraction =
+          scratch.signed_distance[in] / (scratch.signed_distance[in] - scratch.signed_distance[out]);
+      const double *a = vertices() + static_cast<std::ptrdiff_t>(in) * k,
+                   *b = vertices() + static_cast<std::ptrdiff_t>(out) * k;
+      for (int c = 0; c < k; ++c) scratch.vertices.push_back(a[c] + fraction * (b[c] - a[c]));
+      // The facets of a vertex ascend.
+      const auto added = static_cast<FacetIndex>(facet);
+      int i = 0;
+      for (; i < k - 1 && shared[i] < added; ++i) scratch.facets.push_back(shared[i]);
+      scratch.facets.push_back(added);
+      for (; i < k - 1; ++i) scratch.facets.push_back(shared[i]);
+      ++found;
+    }
+  return found;
 }
 
-// Removes the vertices `gone` (ascending) by moving the last ones into their places.
-void Polytope::fill_gaps(const std::vector<int>& gone) {
-  int last = vertex_count() - 1, final_count = vertex_count() - static_cast<int>(gone.size());
-  std::size_t end = gone.size();
-  for (const int gap : gone) {
-    if (gap >= final_count) break;
-    while (end > 0 && gone[end - 1] == last) {
-      --end;
+// Puts the new vertices into the places of the outside ones; what is left over goes to the end, or the end moves into
+// the gaps.
+void Polytope::replace(int new_count, const Scratch& scratch) {
+  const int gone = scratch.outside_count;
+  const int final_count = vertex_count_ - gone + new_count;
+  if (final_count > vertex_capacity_) resize(final_count + 1 + final_count / 16, facet_capacity_);
+  for (int o = 0; o < gone; ++o)
+    for (int c = 0; c < k_; ++c) --uses()[facets()[scratch.outside[o] * k_ + c]];
+  for (const FacetIndex f : scratch.facets) ++uses()[f];
+  for (int i = 0; i < new_count; ++i) {
+    const int place = i < gone ? scratch.outside[i] : vertex_count_ + i - gone;
+    std::copy_n(&scratch.vertices[static_cast<std::size_t>(i) * k_], k_, vertices() + place * k_);
+    std::copy_n(&scratch.facets[static_cast<std::size_t>(i) * k_], k_, facets() + place * k_);
+    states()[place] = 0;
+  }
+  int last = vertex_count_ - 1, last_gone = gone - 1;
+  for (int i = new_count; i < gone; ++i) {
+    const int gap = scratch.outside[i];
+    while (last_gone >= i && scratch.outside[last_gone] == last) {
+      --last_gone;
       --last;
     }
-    std::copy_n(vertex(last), k_, &vertices_[static_cast<std::size_t>(gap) * k_]);
-    std::copy_n(facets_at(last), k_, &facets_[static_cast<std::size_t>(gap) * k_]);
-    masks_[gap] = masks_[last];
-    state_[gap] = state_[last];
+    if (gap >= last) break;
+    std::copy_n(vertices() + last * k_, k_, vertices() + gap * k_);
+    std::copy_n(facets() + last * k_, k_, facets() + gap * k_);
+    states()[gap] = states()[last];
     --last;
   }
-  vertices_.resize(static_cast<std::size_t>(final_count) * k_);
-  facets_.resize(static_cast<std::size_t>(final_count) * k_);
-  masks_.resize(final_count);
-  state_.resize(final_count);
+  vertex_count_ = final_count;
 }
 
 int Polytope::expandable_vertex(double radius) const {
   double farthest = radius * radius;
   int found = -1;
-  for (int i = 0; i < vertex_count(); ++i) {
-    if (state_[i]) continue;
+  const double* u = vertices();
+  const std::uint8_t* closed = states();
+  for (int i = 0; i < vertex_count_; ++i, u += k_) {
+    if (closed[i]) continue;
     double squared = 0.0;
-    for (int c = 0; c < k_; ++c) squared += vertex(i)[c] * vertex(i)[c];
+    for (int c = 0; c < k_; ++c) squared += u[c] * u[c];
     if (squared > farthest) {
       farthest = squared;
       found = i;
@@ -185,9 +287,9 @@ int Polytope::expandable_vertex(double radius) const {
 }
 
 bool Polytope::contains(const double* u, double tolerance) const {
-  for (int f = 0; f < facet_slots(); ++f) {
+  for (int f = 0; f < facet_count_; ++f) {
     if (!facet_active(f)) continue;
-    double s = -offsets_[f];
+    double s = -offsets()[f];
     for (int c = 0; c < k_; ++c) s += normal(f)[c] * u[c];
     if (s > tolerance) return false;
   }

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 namespace graspatlas {
@@ -10,56 +12,91 @@ namespace graspatlas {
 /// It is kept simple in the sense of combinatorics: every vertex lies on exactly k facets, so two vertices
 /// share an edge exactly when they share k - 1 facets. A half-space through a vertex counts the vertex as
 /// inside, which keeps it so.
+///
+/// An atlas holds millions of them: all arrays of one lie in one piece of memory, hardly larger than they need.
 class Polytope {
  public:
   /// Tag of the facets of the initial box; neighbours are tagged by their index, bounds by bound_tag.
   static constexpr int kBox = -1;
   static constexpr int bound_tag(int bound) { return -2 - bound; }
 
+  /// Work space of `cut`, one for each thread.
+  struct Scratch {
+    std::vector<double> signed_distance, vertices;
+    std::vector<std::uint64_t> masks;
+    std::vector<std::uint16_t> facets, shared;
+    std::vector<int> inside, outside;
+    int inside_count = 0, outside_count = 0;
+  };
+
+  Polytope() = default;
   /// The box [-half_width, half_width]^dimension.
   Polytope(int dimension, double half_width);
+  /// A copy takes no more memory than it needs.
+  Polytope(const Polytope& other);
+  Polytope& operator=(const Polytope& other);
+  Polytope(Polytope&&) = default;
+  Polytope& operator=(Polytope&&) = default;
+
+  /// Becomes that box again, and keeps its memory.
+  void reset(int dimension, double half_width);
 
   /// Keep the points u with normal . u <= offset, for offset >= 0. False when that removes no vertex.
-  bool cut(const double* normal, double offset, int tag);
+  bool cut(const double* normal, double offset, int tag, Scratch& scratch);
 
   int dimension() const { return k_; }
-  int vertex_count() const { return static_cast<int>(state_.size()); }
-  const double* vertex(int i) const { return &vertices_[static_cast<std::size_t>(i) * k_]; }
+  int vertex_count() const { return vertex_count_; }
+  const double* vertex(int i) const { return vertices() + static_cast<std::ptrdiff_t>(i) * k_; }
 
   /// 0 for a vertex that may still be expanded, else the reason (one the atlas gave) that it cannot be.
-  std::uint8_t state(int i) const { return state_[i]; }
-  void close(int i, std::uint8_t reason) { state_[i] = reason; }
+  std::uint8_t state(int i) const { return states()[i]; }
+  void close(int i, std::uint8_t reason) { states()[i] = reason; }
 
   /// Farthest vertex outside the ball of this radius that is not closed; -1 if there is none.
   int expandable_vertex(double radius) const;
 
   /// Facets are numbered 0 .. facet_slots()-1; a slot whose facet was cut away entirely is not active.
-  int facet_slots() const { return static_cast<int>(tags_.size()); }
-  bool facet_active(int f) const { return uses_[f] > 0; }
-  const double* normal(int f) const { return &normals_[static_cast<std::size_t>(f) * k_]; }
-  double offset(int f) const { return offsets_[f]; }
-  int tag(int f) const { return tags_[f]; }
+  int facet_slots() const { return facet_count_; }
+  bool facet_active(int f) const { return uses()[f] > 0; }
+  const double* normal(int f) const { return normals() + static_cast<std::ptrdiff_t>(f) * k_; }
+  double offset(int f) const { return offsets()[f]; }
+  int tag(int f) const { return tags()[f]; }
 
   bool contains(const double* u, double tolerance) const;
+
+  /// Memory that it holds besides itself.
+  std::int64_t bytes() const { return bytes(k_, vertex_capacity_, facet_capacity_); }
 
  private:
   using FacetIndex = std::uint16_t;
   static constexpr int kMaskBits = 64;
 
-  const FacetIndex* facets_at(int vertex) const { return &facets_[static_cast<std::size_t>(vertex) * k_]; }
-  int new_facet(const double* normal, double offset, int tag);
-  void add_vertex_on_edge(int inside, int outside, double fraction, const FacetIndex* shared, int facet);
-  void fill_gaps(const std::vector<int>& gone);
+  // The arrays, one after another in storage_: positions of the vertices [vertices x k], normals [facets x k] and
+  // offsets of the facets; their tags and numbers of vertices; the facets of each vertex, ascending [vertices x k];
+  // the states of the vertices.
+  double* vertices() const { return reinterpret_cast<double*>(storage_.get()); }
+  double* normals() const { return vertices() + static_cast<std::ptrdiff_t>(vertex_capacity_) * k_; }
+  double* offsets() const { return normals() + static_cast<std::ptrdiff_t>(facet_capacity_) * k_; }
+  std::int32_t* tags() const { return reinterpret_cast<std::int32_t*>(offsets() + facet_capacity_); }
+  std::int32_t* uses() const { return tags() + facet_capacity_; }
+  FacetIndex* facets() const { return reinterpret_cast<FacetIndex*>(uses() + facet_capacity_); }
+  std::uint8_t* states() const {
+    return reinterpret_cast<std::uint8_t*>(facets() + static_cast<std::ptrdiff_t>(vertex_capacity_) * k_);
+  }
+  static std::int64_t bytes(std::int64_t k, std::int64_t vertices, std::int64_t facets) {
+    return vertices * (k * 8 + k * 2 + 1) + facets * (k * 8 + 8 + 4 + 4);
+  }
 
-  int k_;
-  std::vector<double> vertices_;      // vertex_count x k
-  std::vector<FacetIndex> facets_;    // vertex_count x k, ascending in each row
-  std::vector<std::uint64_t> masks_;  // vertex_count: bit f for facet f, useful while there are at most kMaskBits slots
-  std::vector<std::uint8_t> state_;   // vertex_count
-  std::vector<double> normals_;       // facet_slots x k
-  std::vector<double> offsets_;
-  std::vector<int> tags_;
-  std::vector<int> uses_;  // vertices on each facet
+  void resize(int vertex_capacity, int facet_capacity);
+  int new_facet(const double* normal, double offset, int tag);
+  template <int K>
+  bool cut_in(const double* normal, double offset, int tag, Scratch& scratch);
+  template <int K>
+  int find_new_vertices(int facet, Scratch& scratch);
+  void replace(int new_count, const Scratch& scratch);
+
+  std::unique_ptr<std::byte[]> storage_;
+  std::int32_t k_ = 0, vertex_count_ = 0, vertex_capacity_ = 0, facet_count_ = 0, facet_capacity_ = 0;
 };
 
 }  // namespace graspatlas

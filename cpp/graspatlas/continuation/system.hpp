@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <stdexcept>
 #include <string>
 
@@ -74,7 +75,11 @@ class System {
   /// Charts must be smaller: with angles among the coordinates, displacements of more than half a turn are ambiguous.
   virtual double radius_limit() const;
 
+  /// A copy that another thread may use at the same time; null where there can be none, as for equations in Python.
+  virtual std::unique_ptr<System> clone() const { return nullptr; }
+
  protected:
+  System(const System&) = default;
   void set_bound_normals(const RowMatrix& B) { bound_normals_ = B; }
 
  private:

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+
 #include "graspatlas/continuation/system.hpp"
 
 namespace graspatlas {
@@ -10,6 +12,7 @@ class Sphere : public System {
   explicit Sphere(int n);
   void residual(const double* x, double* R) override;
   void linearize(const double* x, double* R, double* J) override;
+  std::unique_ptr<System> clone() const override { return std::make_unique<Sphere>(*this); }
 };
 
 /// The torus (sqrt(x^2 + y^2) - major)^2 + z^2 = minor^2 in R^3.
@@ -18,6 +21,7 @@ class Torus : public System {
   Torus(double major_radius, double minor_radius);
   void residual(const double* x, double* R) override;
   void linearize(const double* x, double* R, double* J) override;
+  std::unique_ptr<System> clone() const override { return std::make_unique<Torus>(*this); }
 
  private:
   double major_, minor_;
@@ -33,6 +37,7 @@ class Angles : public System {
   void difference(const double* x0, const double* x1, double* out) const override;
   void embed(const double* x, double* out) const override;
   double radius_limit() const override;
+  std::unique_ptr<System> clone() const override { return std::make_unique<Angles>(*this); }
 };
 
 /// All rotations and no equation: SO(3) as unit quaternions (x, y, z, w), tangent vectors are body rotation
@@ -47,6 +52,7 @@ class Rotations : public System {
   void embed(const double* x, double* out) const override;
   void check_point(const double* x) const override;
   double radius_limit() const override;
+  std::unique_ptr<System> clone() const override { return std::make_unique<Rotations>(*this); }
 };
 
 }  // namespace graspatlas

@@ -100,8 +100,8 @@ GraspSystem::GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> cont
     if (side.joint < 0 || side.joint >= joints)
       throw Error("a contact sits on joint " + std::to_string(side.joint) + ", the model has " +
                   std::to_string(joints));
-    if (side.u.free) parameters_.push_back({&side.u, side.patch->u_unit()});
-    if (side.v.free) parameters_.push_back({&side.v, side.patch->v_unit()});
+    if (side.u.free) parameters_.push_back({side.u, side.patch->u_unit()});
+    if (side.v.free) parameters_.push_back({side.v, side.patch->v_unit()});
   });
   add_joint_bounds(lower, upper);
   add_parameter_bounds();
@@ -139,7 +139,7 @@ void GraspSystem::add_joint_bounds(const std::vector<double>& lower, const std::
 
 void GraspSystem::add_parameter_bounds() {
   for (std::size_t i = 0; i < parameters_.size(); ++i) {
-    const PatchParameter& parameter = *parameters_[i].parameter;
+    const PatchParameter& parameter = parameters_[i].parameter;
     if (parameter.periodic) continue;
     const double scale = parameter_scale(parameters_[i].unit, length_scale_);
     const auto add = [&](double sign, double limit, const char* side) {
@@ -282,7 +282,7 @@ void GraspSystem::integrate(const double* x, const double* v, double* out) const
   for (int i = 0; i < parameter_count(); ++i) {
     const int at = model_->q_size() + i;
     out[at] = x[at] + parameter_scale(parameters_[i].unit, length_scale_) * v_w[i];
-    if (parameters_[i].parameter->periodic) out[at] = wrap_angle(out[at]);
+    if (parameters_[i].parameter.periodic) out[at] = wrap_angle(out[at]);
   }
 }
 
@@ -304,7 +304,7 @@ void GraspSystem::difference(const double* x0, const double* x1, double* out) co
     const int at = model_->q_size() + i;
     const double d = x1[at] - x0[at];
     out_w[i] =
-        parameters_[i].parameter->periodic ? wrap_angle(d) : d / parameter_scale(parameters_[i].unit, length_scale_);
+        parameters_[i].parameter.periodic ? wrap_angle(d) : d / parameter_scale(parameters_[i].unit, length_scale_);
   }
 }
 
@@ -349,6 +349,12 @@ void GraspSystem::check_point(const double* x) const {
 }
 
 double GraspSystem::radius_limit() const { return kLargestAngularRadius; }
+
+std::unique_ptr<System> GraspSystem::clone() const {
+  auto copy = std::make_unique<GraspSystem>(*this);
+  copy->model_ = std::make_shared<Model>(*model_);
+  return copy;
+}
 
 void GraspSystem::contact_points(const double* x, ContactPoint* out) {
   model_->update(x, false);

@@ -61,6 +61,7 @@ class GraspSystem : public System {
   std::string bound_name(int i) const override { return bound_names_[static_cast<std::size_t>(i)]; }
   void check_point(const double* x) const override;
   double radius_limit() const override;
+  std::unique_ptr<System> clone() const override;
 
   const Model& model() const { return *model_; }
   int contact_count() const { return static_cast<int>(contacts_.size()); }
@@ -85,7 +86,7 @@ class GraspSystem : public System {
     double sign, limit, scale;
   };
   struct FreeParameter {
-    const PatchParameter* parameter;
+    PatchParameter parameter;
     ParameterUnit unit;
   };
   struct SideState {

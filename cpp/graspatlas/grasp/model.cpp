@@ -100,6 +100,18 @@ Model::Model(const std::string& urdf, ObjectJoint object) : pinocchio_(new Pinoc
       for (int v = 0; v < model.nvs[ancestor]; ++v) supports_[j].push_back(model.idx_vs[ancestor] + v);
 }
 
+Model::Model(const Model& other)
+    : pinocchio_(new Pinocchio(*other.pinocchio_)),
+      hand_q_size_(other.hand_q_size_),
+      hand_v_size_(other.hand_v_size_),
+      object_joint_(other.object_joint_),
+      object_kind_(other.object_kind_),
+      hand_is_euclidean_(other.hand_is_euclidean_),
+      hand_joints_(other.hand_joints_),
+      hand_frames_(other.hand_frames_),
+      placements_(other.placements_),
+      supports_(other.supports_) {}
+
 Model::~Model() = default;
 
 int Model::q_size() const { return pinocchio_->model.nq; }

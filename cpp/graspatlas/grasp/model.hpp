@@ -26,11 +26,12 @@ struct FrameInfo {
 /// Hand and object as one kinematic tree; q = [hand, object] in Pinocchio's conventions.
 ///
 /// Its source is the only file that includes Pinocchio. A model holds the results of its last `update`, so it
-/// must not be shared between threads.
+/// must not be shared between threads: each takes a copy.
 class Model {
  public:
   /// `urdf` is the text of the hand's URDF; its root is the world. Throws Error when it cannot be read.
   Model(const std::string& urdf, ObjectJoint object);
+  Model(const Model& other);
   ~Model();
 
   int q_size() const;

@@ -41,8 +41,8 @@ STAGES = (40, 130, 100000)
 
 def sphere(progress: bool) -> Section:
     """Fig. 7: the growth of an atlas over a sphere."""
-    options = {"radius": 0.2, "epsilon": 0.2}
-    stages = [build_atlas(Sphere(3), [0.0, -0.6, 0.8], max_charts=n, progress=False, **options) for n in STAGES]
+    x0 = [0.0, -0.6, 0.8]
+    stages = [build_atlas(Sphere(3), x0, radius=0.2, epsilon=0.2, max_charts=n, progress=False) for n in STAGES]
     if any(stage.status is Status.INTERRUPTED for stage in stages):
         raise KeyboardInterrupt
     last = stages[-1]

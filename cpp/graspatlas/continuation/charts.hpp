@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <shared_mutex>
+#include <thread>
+#include <vector>
+
+#include "graspatlas/continuation/neighbours.hpp"
+#include "graspatlas/continuation/newton.hpp"
+#include "graspatlas/continuation/polytope.hpp"
+#include "graspatlas/continuation/rows.hpp"
+#include "graspatlas/continuation/system.hpp"
+
+namespace graspatlas {
+
+struct AtlasOptions {
+  double radius = 0.1;   ///< r: radius of the ball that a chart may cover [units of the tangent space]
+  double epsilon = 0.1;  ///< eqs (17) and (18): how far and how different neighbouring charts may be
+  NewtonOptions newton;
+  double shrink = 0.9;          ///< alpha is multiplied by this after each failed attempt (Algorithm 1, line 11)
+  double smallest_step = 0.05;  ///< a vertex is closed when alpha falls below this share of the radius
+};
+
+/// Place of a chart in its atlas in the order of the algorithm, as far as it is known.
+using ChartKey = std::uint64_t;
+
+struct Chart {
+  Polytope polytope;                ///< facets are tagged by the slots of the charts behind them
+  const int* neighbours = nullptr;  ///< slots of the neighbours older than the chart itself
+  int neighbour_count = 0;
+  int number = -1;        ///< in the order of the algorithm; -1 until that is settled
+  ChartKey key = 0;       ///< ascends in the order of the algorithm
+  double residual = 0.0;  ///< largest entry of |R| at the centre
+};
+
+/// The charts of an atlas as several threads make them: each has a slot, a number that means nothing.
+///
+/// A thread may read and change charts while others do, as long as no two touch the same one; adding a chart and
+/// looking neighbours up take a lock.
+class Charts {
+ public:
+  Charts(int x_size, int basis_size, int embedding_size)
+      : x_size_(x_size), charts_(1), rows_(x_size + basis_size), index_(embedding_size) {}
+
+  Chart& operator[](int slot) { return *charts_[static_cast<std::size_t>(slot)]; }
+  const Chart& operator[](int slot) const { return *charts_[static_cast<std::size_t>(slot)]; }
+  double* center(int slot) { return rows_[static_cast<std::size_t>(slot)]; }
+  const double* center(int slot) const { return rows_[static_cast<std::size_t>(slot)]; }
+  double* basis(int slot) { return center(slot) + x_size_; }
+  const double* basis(int slot) const { return center(slot) + x_size_; }
+  int count() const { return static_cast<int>(rows_.count()); }
+
+  /// Slot of a new chart. Others do not find it before it is published.
+  int add() {
+    const std::lock_guard lock(adding_);
+    charts_.add();
+    rows_.add();
+    return count() - 1;
+  }
+
+  /// From now on `near` finds the chart, by its embedding.
+  void publish(int slot, const double* embedding) {
+    while (!indexing_.try_lock()) std::this_thread::yield();
+    const std::lock_guard lock(indexing_, std::adopt_lock);
+    index_.insert(embedding, slot);
+  }
+
+  /// Slots of the published charts within a distance, in no order.
+  void near(const double* embedding, double distance, std::vector<int>& out, Neighbours::Scratch& scratch) const {
+    while (!indexing_.try_lock_shared()) std::this_thread::yield();
+    const std::shared_lock lock(indexing_, std::adopt_lock);
+    index_.within(embedding, distance, out, scratch);
+  }
+
+  /// Memory that they hold, without their polytopes' arrays.
+  std::int64_t bytes() const { return static_cast<std::int64_t>(charts_.bytes() + rows_.bytes()) + index_.bytes(); }
+
+ private:
+  int x_size_;
+  Rows<Chart> charts_;
+  Rows<double> rows_;  // centre and basis
+  Neighbours index_;
+  std::mutex adding_;
+  mutable std::shared_mutex indexing_;
+};
+
+}  // namespace graspatlas

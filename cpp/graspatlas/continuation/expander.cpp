@@ -1,0 +1,243 @@
+#include "graspatlas/continuation/expander.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "graspatlas/continuation/chart.hpp"
+
+namespace graspatlas {
+
+namespace {
+
+// A centre may miss a bound by rounding only.
+constexpr double kBoundTolerance = 1e-10;
+// Numbers in a block of lists of neighbours.
+constexpr std::size_t kListBlock = 1 << 16;
+
+// Half the width of a chart's box. It encloses the ball of the chart's radius, and on a line the box must be wider than
+// the ball so that it has ends outside.
+double half_width(int dimension, double radius) { return dimension == 1 ? 1.5 * radius : radius; }
+
+double squared_length(const double* v, int size) {
+  double sum = 0.0;
+  for (int c = 0; c < size; ++c) sum += v[c] * v[c];
+  return sum;
+}
+
+}  // namespace
+
+Expander::Expander(System& system, const AtlasOptions& options, Charts& charts)
+    : system_(system),
+      options_(options),
+      charts_(charts),
+      x_size_(system.configuration_size()),
+      n_(system.tangent_size()),
+      k_(system.dimension()),
+      newton_(system, options.newton),
+      x_new_(x_size_),
+      Phi_new_(static_cast<std::size_t>(k_) * n_),
+      step_(n_),
+      displacement_(n_),
+      p_ij_(k_),
+      p_ji_(k_),
+      work_(2 * static_cast<std::size_t>(k_) * k_),
+      slack_(system.bound_count()),
+      bound_in_chart_(k_),
+      direction_(k_),
+      vertex_(k_),
+      embedding_(system.embedding_size()),
+      polytope_(k_, half_width(k_, options.radius)) {}
+
+void Expander::start(const double* x0) {
+  x_new_.assign(x0, x0 + x_size_);
+  ++projections_;
+  switch (newton_.project_freely(x_new_.data(), Phi_new_.data())) {
+    case Projection::converged:
+      break;
+    case Projection::singular:
+      throw Error(
+          "the Jacobian at x0 has lost rank: the equations are redundant there, so the solutions near x0 are "
+          "not a manifold of dimension " +
+          std::to_string(k_) + "; drop redundant equations or move x0");
+    case Projection::not_converged:
+      throw Error("x0 is not on the manifold and could not be projected onto it: residual " +
+                  to_text(newton_.residual()));
+  }
+  if (!inside_bounds(x_new_.data())) {
+    const auto worst = std::min_element(slack_.begin(), slack_.end()) - slack_.begin();
+    throw Error("x0, projected onto the manifold, breaks the " + system_.bound_name(static_cast<int>(worst)) + " by " +
+                to_text(-slack_[worst]));
+  }
+  add_chart(0);
+}
+
+bool Expander::inside_bounds(const double* x) {
+  if (slack_.empty()) return true;
+  system_.slack(x, slack_.data());
+  for (double s : slack_)
+    if (!(s >= -kBoundTolerance)) return false;
+  return true;
+}
+
+const double* Expander::embedding_of(int slot) {
+  system_.embed(charts_.center(slot), embedding_.data());
+  return embedding_.data();
+}
+
+int Expander::expand(int i, ChartKey key, int most) {
+  int made = 0;
+  while (made < most) {
+    const int vertex = charts_[i].polytope.expandable_vertex(options_.radius);
+    if (vertex < 0) break;
+    if (expand_vertex(i, vertex, key + static_cast<ChartKey>(made))) ++made;
+  }
+  return made;
+}
+
+bool Expander::expand_vertex(int i, int vertex, ChartKey key) {
+  Polytope& polytope = charts_[i].polytope;
+  vertex_.assign(polytope.vertex(vertex), polytope.vertex(vertex) + k_);
+  const double norm = std::sqrt(squared_length(vertex_.data(), k_));
+  for (int c = 0; c < k_; ++c) direction_[c] = vertex_[c] / norm;
+
+  Closed reason = Closed::open;
+  for (double alpha = options_.radius; alpha >= options_.smallest_step * options_.radius; alpha *= options_.shrink) {
+    reason = attempt(i, direction_.data(), alpha);
+    if (reason == Closed::open) {
+      add_chart(key);
+      // The new neighbour cuts the vertex off; should rounding keep it, it must not be expanded again.
+      for (int u = 0; u < polytope.vertex_count(); ++u)
+        if (std::equal(vertex_.begin(), vertex_.end(), polytope.vertex(u)))
+          polytope.close(u, static_cast<std::uint8_t>(Closed::curvature));
+      return true;
+    }
+  }
+  polytope.close(vertex, static_cast<std::uint8_t>(reason));
+  return false;
+}
+
+// Projects a step of length alpha from chart i into x_new_, Phi_new_: eqs (14) to (18).
+Closed Expander::attempt(int i, const double* direction, double alpha) {
+  const double* Phi = charts_.basis(i);
+  for (int c = 0; c < n_; ++c) {
+    double sum = 0.0;
+    for (int a = 0; a < k_; ++a) sum += Phi[static_cast<std::size_t>(a) * n_ + c] * direction[a];
+    step_[c] = alpha * sum;
+  }
+  system_.integrate(charts_.center(i), step_.data(), x_new_.data());
+  ++projections_;
+  if (newton_.project(x_new_.data(), Phi) != Projection::converged) return Closed::not_converged;
+  if (!inside_bounds(x_new_.data())) return Closed::bounds;
+  if (!newton_.tangent_basis(Phi_new_.data())) return Closed::not_converged;
+  if (!pass_tests(i, x_new_.data(), Phi_new_.data(), p_ij_.data(), p_ji_.data())) return Closed::curvature;
+  const double longest = kLongestStep * options_.radius;
+  if (squared_length(displacement_.data(), n_) > longest * longest) return Closed::curvature;
+  return Closed::open;
+}
+
+// Eqs (17) and (18) between chart i and a chart at x_j, and the images of each centre in the other's tangent space.
+// Eq (17) is a length, which may exceed a chart's own size: then charts on two sides of a fold would cut each other at
+// images far from the middle between them, and leave a gap. So the displacement between the centres, too, may differ
+// from either tangent space by no larger an angle than eq (18) allows between the spaces.
+bool Expander::pass_tests(int i, const double* x_j, const double* Phi_j, double* p_ij, double* p_ji) {
+  system_.difference(charts_.center(i), x_j, displacement_.data());
+  const double squared = squared_length(displacement_.data(), n_);
+  if (squared > 4.0 * options_.radius * options_.radius) return false;
+  const double cosine = 1.0 - options_.epsilon;
+  const double limit = std::min(options_.epsilon * options_.epsilon, (1.0 - cosine * cosine) * squared);
+  if (project_displacement(charts_.basis(i), displacement_.data(), k_, n_, p_ij) > limit) return false;
+  if (project_displacement(Phi_j, displacement_.data(), k_, n_, p_ji) > limit) return false;
+  for (int a = 0; a < k_; ++a) p_ji[a] = -p_ji[a];
+  return tangent_spaces_agree(charts_.basis(i), Phi_j, k_, n_, cosine, work_.data());
+}
+
+// The chart at x_new_: its own polytope first, which is stored when it has its size, then it is shown to others.
+void Expander::add_chart(ChartKey key) {
+  const int j = charts_.add();
+  Chart& chart = charts_[j];
+  std::copy(x_new_.begin(), x_new_.end(), charts_.center(j));
+  std::copy(Phi_new_.begin(), Phi_new_.end(), charts_.basis(j));
+  chart.residual = newton_.residual();
+  chart.key = key;
+  polytope_.reset(k_, half_width(k_, options_.radius));
+  cut_by_bounds(j);
+  meet_neighbours(j);
+  chart.polytope = polytope_;
+  chart.neighbours = keep(neighbours_);
+  chart.neighbour_count = static_cast<int>(neighbours_.size());
+  polytope_bytes_ += chart.polytope.bytes();
+  list_bytes_ += static_cast<std::int64_t>(neighbours_.size() * sizeof(int));
+  charts_.publish(j, embedding_.data());
+}
+
+void Expander::cut_by_bounds(int j) {
+  if (slack_.empty()) return;
+  system_.slack(charts_.center(j), slack_.data());
+  const RowMatrix& B = system_.bound_normals();
+  for (int b = 0; b < system_.bound_count(); ++b) {
+    double squared = 0.0;
+    for (int a = 0; a < k_; ++a) {
+      const double* row = charts_.basis(j) + static_cast<std::size_t>(a) * n_;
+      double dot = 0.0;
+      for (int c = 0; c < n_; ++c) dot += B(b, c) * row[c];
+      bound_in_chart_[a] = dot;
+      squared += dot * dot;
+    }
+    const double slack = std::max(slack_[b], 0.0);
+    // The box reaches sqrt(k) r from the centre: a bound farther away cuts nothing.
+    if (slack * slack >= squared * k_ * options_.radius * options_.radius) continue;
+    const double norm = std::sqrt(squared);
+    for (int a = 0; a < k_; ++a) bound_in_chart_[a] /= norm;
+    polytope_.cut(bound_in_chart_.data(), slack / norm, Polytope::bound_tag(b), cut_scratch_);
+  }
+}
+
+// Charts within two radii of x_new_ in the order of the algorithm, into near_.
+void Expander::find_near() {
+  system_.embed(x_new_.data(), embedding_.data());
+  charts_.near(embedding_.data(), 2.0 * options_.radius, near_, near_scratch_);
+  sorted_.clear();
+  for (const int i : near_) sorted_.emplace_back(charts_[i].key, i);
+  std::sort(sorted_.begin(), sorted_.end());
+  for (std::size_t a = 0; a < near_.size(); ++a) near_[a] = sorted_[a].second;
+}
+
+// Eq (16) and Fig. 6b: two charts of equal radius cut each other at the bisector of the centre and the
+// other's image.
+void Expander::meet_neighbours(int j) {
+  find_near();
+  neighbours_.clear();
+  for (const int i : near_) {
+    if (!pass_tests(i, x_new_.data(), Phi_new_.data(), p_ij_.data(), p_ji_.data())) continue;
+    const double squared_ij = squared_length(p_ij_.data(), k_), squared_ji = squared_length(p_ji_.data(), k_);
+    if (!(squared_ij > 0.0) || !(squared_ji > 0.0)) continue;
+    const double norm_ij = std::sqrt(squared_ij), norm_ji = std::sqrt(squared_ji);
+    for (int a = 0; a < k_; ++a) {
+      p_ij_[a] /= norm_ij;
+      p_ji_[a] /= norm_ji;
+    }
+    Polytope& other = charts_[i].polytope;
+    polytope_bytes_ -= other.bytes();
+    other.cut(p_ij_.data(), 0.5 * norm_ij, j, cut_scratch_);
+    polytope_bytes_ += other.bytes();
+    polytope_.cut(p_ji_.data(), 0.5 * norm_ji, i, cut_scratch_);
+    neighbours_.push_back(i);
+  }
+}
+
+// A copy of the list that stays where it is.
+const int* Expander::keep(const std::vector<int>& list) {
+  if (list.size() > list_room_) {
+    list_room_ = std::max(kListBlock, list.size());
+    lists_.emplace_back(new int[list_room_]);
+    next_list_ = lists_.back().get();
+  }
+  int* const copy = next_list_;
+  std::copy(list.begin(), list.end(), copy);
+  next_list_ += list.size();
+  list_room_ -= list.size();
+  return copy;
+}
+
+}  // namespace graspatlas

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "graspatlas/continuation/charts.hpp"
+#include "graspatlas/continuation/newton.hpp"
+#include "graspatlas/continuation/polytope.hpp"
+#include "graspatlas/continuation/system.hpp"
+
+namespace graspatlas {
+
+/// Why a vertex could not be expanded. Zero means that it may still be.
+enum class Closed : std::uint8_t { open = 0, bounds = 1, curvature = 2, not_converged = 3 };
+
+/// The distance, in radii, of a new chart from the one that it is made from is at most this.
+constexpr double kLongestStep = 1.5;
+/// Charts at least this many radii apart may be expanded at the same time: each reaches new charts by the longest step,
+/// and from there the neighbours within two radii, which it cuts.
+/// The last term is for rounding.
+constexpr double kIndependent = 2.0 * (kLongestStep + 2.0) + 1e-3;
+
+/// Expands charts: lines 6 to 12 of Algorithm 1, with the work space of one thread.
+class Expander {
+ public:
+  /// The system is used by this expander only.
+  Expander(System& system, const AtlasOptions& options, Charts& charts);
+
+  /// Adds the first chart, at the point of the manifold nearest x0.
+  /// Throws when x0 cannot be projected, breaks a bound, or the Jacobian there is rank deficient.
+  void start(const double* x0);
+
+  /// Expand a chart until no vertex is left, or `most` charts were made, which get the keys from `key` on. Returns
+  /// their number.
+  int expand(int slot, ChartKey key, int most);
+
+  const double* embedding_of(int slot);
+
+  /// Newton projections made so far, those of failed attempts included.
+  std::int64_t projections() const { return projections_; }
+  /// Memory by which this expander made polytopes grow, and that of the lists of neighbours that it made.
+  std::int64_t polytope_bytes() const { return polytope_bytes_; }
+  std::int64_t list_bytes() const { return list_bytes_; }
+
+ private:
+  Closed attempt(int i, const double* direction, double alpha);
+  bool expand_vertex(int i, int vertex, ChartKey key);
+  void add_chart(ChartKey key);
+  void cut_by_bounds(int j);
+  void meet_neighbours(int j);
+  void find_near();
+  bool pass_tests(int i, const double* x_j, const double* Phi_j, double* p_ij, double* p_ji);
+  bool inside_bounds(const double* x);
+  const int* keep(const std::vector<int>& list);
+
+  System& system_;
+  AtlasOptions options_;
+  Charts& charts_;
+  int x_size_, n_, k_;
+  Newton newton_;
+  std::int64_t projections_ = 0, polytope_bytes_ = 0, list_bytes_ = 0;
+  std::vector<std::unique_ptr<int[]>> lists_;  // of neighbours, one after another
+  int* next_list_ = nullptr;                   // where the next goes
+  std::size_t list_room_ = 0;                  // left there
+
+  // Scratch: the candidate chart and its polytope, and work space of the tests.
+  std::vector<double> x_new_, Phi_new_, step_, displacement_, p_ij_, p_ji_, work_, slack_, bound_in_chart_, direction_,
+      vertex_, embedding_;
+  Polytope polytope_;
+  Polytope::Scratch cut_scratch_;
+  Neighbours::Scratch near_scratch_;
+  std::vector<int> near_, neighbours_;
+  std::vector<std::pair<ChartKey, int>> sorted_;
+};
+
+}  // namespace graspatlas
