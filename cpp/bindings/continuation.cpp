@@ -153,6 +153,50 @@ ArrayTable atlas_arrays(const Atlas& atlas) {
   return out;
 }
 
+template <class T>
+void read_array(const ArrayTable& table, const char* name, std::vector<T>& out) {
+  if (!table.contains(name)) throw Error(std::string("the checkpoint lacks the array '") + name + "'");
+  const auto array = py::cast<py::array_t<T, py::array::c_style | py::array::forcecast>>(table[name]);
+  out.assign(array.data(), array.data() + array.size());
+}
+
+/// The parts of a checkpoint by name.
+template <class Table, class Visit>
+void visit_checkpoint(Table& table, const Visit& visit) {
+  visit("centers", table.centers);
+  visit("bases", table.bases);
+  visit("residuals", table.residuals);
+  visit("keys", table.keys);
+  visit("closed_charts", table.closed_charts);
+  visit("closed_vertices", table.closed_vertices);
+  visit("closed_reasons", table.closed_reasons);
+  visit("generation", table.generation);
+  visit("again", table.again);
+}
+
+Checkpoint read_checkpoint(const ArrayTable& table) {
+  Checkpoint out;
+  visit_checkpoint(out, [&table](const char* name, auto& part) { read_array(table, name, part); });
+  std::vector<std::int64_t> counts;
+  read_array(table, "counts", counts);
+  if (counts.size() != 3) throw Error("the checkpoint's counts must be three");
+  out.position = counts[0];
+  out.next_first = counts[1];
+  out.task_count = counts[2];
+  return out;
+}
+
+ArrayTable write_checkpoint(const Checkpoint& checkpoint) {
+  ArrayTable out;
+  visit_checkpoint(checkpoint, [&out](const char* name, const auto& part) {
+    out[name] = py::array_t<typename std::decay_t<decltype(part)>::value_type>(static_cast<py::ssize_t>(part.size()),
+                                                                               part.data());
+  });
+  const std::int64_t counts[] = {checkpoint.position, checkpoint.next_first, checkpoint.task_count};
+  out["counts"] = py::array_t<std::int64_t>(3, counts);
+  return out;
+}
+
 py::array_t<double> vector(const std::vector<double>& values) {
   return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
 }
@@ -287,6 +331,21 @@ void bind_continuation(py::module_& module) {
            }),
            py::arg("system"), py::arg("x0"), py::arg("radius"), py::arg("epsilon"), py::arg("threads") = 1,
            py::keep_alive<1, 2>())
+      .def_static(
+          "resume",
+          [](System& system, const ArrayTable& saved, double radius, double epsilon, int threads) {
+            AtlasOptions options;
+            options.radius = radius;
+            options.epsilon = epsilon;
+            const Checkpoint checkpoint = read_checkpoint(saved);
+            const py::gil_scoped_release release;
+            return std::make_unique<Atlas>(system, checkpoint, options, threads);
+          },
+          py::arg("system"), py::arg("saved"), py::arg("radius"), py::arg("epsilon"), py::arg("threads") = 1,
+          py::keep_alive<0, 1>(), "Goes on from what `save` returned, with all charts, to the same atlas.")
+      .def(
+          "save", [](const Atlas& atlas, std::int64_t first) { return write_checkpoint(atlas.save(first)); },
+          py::arg("first") = 0, "All that is needed to go on later, as arrays, with the charts from `first` on.")
       .def("expand", &Atlas::expand, py::arg("chart_limit"), py::arg("seconds"),
            py::call_guard<py::gil_scoped_release>(),
            "Expand until complete, the limit of charts is reached, or the seconds have passed.")

@@ -205,6 +205,17 @@ class AtlasBuilder:
     """
     Grows an atlas chart by chart (Algorithm 1, lines 4 to 13).
     """
+    @staticmethod
+    def resume(
+        system: AnySystem,
+        saved: dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]],
+        radius: typing.SupportsFloat | typing.SupportsIndex,
+        epsilon: typing.SupportsFloat | typing.SupportsIndex,
+        threads: typing.SupportsInt | typing.SupportsIndex = 1,
+    ) -> AtlasBuilder:
+        """
+        Goes on from what `save` returned, with all charts, to the same atlas.
+        """
     def __init__(
         self,
         system: AnySystem,
@@ -224,6 +235,12 @@ class AtlasBuilder:
     ) -> None:
         """
         Expand until complete, the limit of charts is reached, or the seconds have passed.
+        """
+    def save(
+        self, first: typing.SupportsInt | typing.SupportsIndex = 0
+    ) -> dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]]:
+        """
+        All that is needed to go on later, as arrays, with the charts from `first` on.
         """
     @property
     def complete(self) -> bool:

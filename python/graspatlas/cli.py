@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from graspatlas import __version__
 from graspatlas.atlas import Status
+from graspatlas.checkpoints import CheckpointFolder
 from graspatlas.components import Components, SearchStatus, find_components
 from graspatlas.errors import GraspAtlasError
 from graspatlas.files import replaced
@@ -226,10 +227,13 @@ def _optimize(options: argparse.Namespace) -> int:
     given = {name: getattr(options, name) for name in names}
     if options.components:
         return _report_components(find_components(problem, **given, require=require, progress=True), options, folder)
-    result = optimize(problem, **given, require=require, progress=True)
+    checkpoint = folder / "checkpoint" if folder else None
+    result = optimize(problem, **given, require=require, checkpoint=checkpoint, progress=True)
     if folder:
         result.save(folder / "result.npz")
         _write_json(result.summary(), folder / "summary.json")
+        if result.status is Status.COMPLETE:
+            CheckpointFolder.remove(folder / "checkpoint")
     print(json.dumps(result.summary()) if options.json else _report(result, folder))
     if result.status is Status.INTERRUPTED:
         return INTERRUPTED
@@ -298,6 +302,8 @@ def _report(result: Result, folder: Path | None) -> str:
         lines += _refined_lines(result)
     if not result.is_global:
         lines.append("  the atlas does not cover all grasps: better ones may exist")
+    if folder and result.status is not Status.COMPLETE:
+        lines.append("  run the same command again, with a higher limit if there was one, and it goes on from here")
     if folder:
         lines.append(f"  written to {folder}; look at it with: graspatlas view {folder}")
     return "\n".join(lines)

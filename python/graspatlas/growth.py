@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,12 +15,15 @@ from tqdm import tqdm
 
 from graspatlas import _core
 from graspatlas.atlas import Status
+from graspatlas.checkpoints import CheckpointFolder
 from graspatlas.errors import GraspAtlasError
 from graspatlas.systems import AnySystem
 
 __all__ = ["Growth", "Limits", "available_bytes", "available_threads", "outlook"]
 
 _SLICE_SECONDS = 0.1
+#: Work that a killed run can lose [s], but for the time that writing takes.
+_CHECKPOINT_SECONDS = 20.0
 _QUIET_SECONDS = 1.0  # work that ends within this shows no progress bar
 #: A coarse atlas that tells the size of the one being grown has this part of its charts, about.
 _COARSE_SHARE = 1 / 30
@@ -63,8 +67,25 @@ class Growth:
         self._coarse: _core.AtlasBuilder | None = None
         self._dimension = system.dimension
 
-    def run(self, limits: Limits, progress: bool | None) -> Status:
-        """Grow the atlas until it is complete or meets a limit."""
+    def run(self, limits: Limits, progress: bool | None, checkpoint: CheckpointFolder | None = None) -> Status:
+        """Grow the atlas until it is complete or meets a limit; a run that is long or cut short keeps a checkpoint."""
+        if checkpoint is None:
+            return self._run(limits, progress, lambda: None)
+        written = time.perf_counter()
+
+        def keep() -> None:
+            nonlocal written
+            if time.perf_counter() - written > _CHECKPOINT_SECONDS:
+                checkpoint.write(self.builder)
+                written = time.perf_counter()
+
+        start = written
+        status = self._run(limits, progress, keep)
+        if status is not Status.COMPLETE or written > start:
+            checkpoint.write(self.builder)
+        return status
+
+    def _run(self, limits: Limits, progress: bool | None, after_slice: Callable[[], None]) -> Status:
         shown = sys.stderr.isatty() if progress is None else progress
         # In a file a line every ten seconds is enough.
         interval = 0.1 if sys.stderr.isatty() else 10.0
@@ -74,7 +95,7 @@ class Growth:
             disable=not shown,
             delay=_QUIET_SECONDS,
             file=sys.stderr,
-            initial=1,
+            initial=self.builder.n_charts,
             mininterval=interval,
         )
         builder, start = self.builder, time.perf_counter()
@@ -93,6 +114,7 @@ class Growth:
                     size = self.expected_size(seconds)
                     bar.set_postfix_str(outlook(builder, size, time.perf_counter() - start), refresh=False)
                 bar.update(builder.n_charts - bar.n)
+                after_slice()
         except KeyboardInterrupt:
             if shown:
                 print(f"interrupted: keeping {builder.n_charts} charts", file=sys.stderr)

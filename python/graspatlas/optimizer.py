@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,10 +11,11 @@ from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from graspatlas import _core
 from graspatlas.atlas import Atlas
+from graspatlas.checkpoints import CheckpointFolder, run_digest
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasps
 from graspatlas.growth import Growth, Limits, available_bytes, available_threads
@@ -39,6 +42,7 @@ def build_atlas(
     max_seconds: float | None = None,
     max_bytes: float | None = None,
     threads: int | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
     progress: bool | None = None,
 ) -> Atlas:
     """Cover the solutions of R(x) = 0 that are connected to a first point with charts.
@@ -58,6 +62,8 @@ def build_atlas(
         max_bytes: Memory of the atlas, with the arrays that are made of it, beyond which it is cut short; by default
             four fifths of what the machine (or the container) has free.
         threads: Threads that work at the same time; all cores by default. A system written in Python has one.
+        checkpoint: Folder in which a run that is long or cut short keeps what it has every 20 s, and from which the
+            same call goes on, to the same atlas, to the bit. The folder stays; delete it when you have the atlas.
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
     Returns:
@@ -78,13 +84,29 @@ def build_atlas(
     workers = available_threads() if threads is None else _whole("threads", threads)
     start = time.perf_counter()
     first = _numbers("x0", x0)
-    builder = _core.AtlasBuilder(system, first, radius, epsilon, workers)
+    folder = CheckpointFolder(checkpoint, run_digest(system, first, radius, epsilon)) if checkpoint else None
+    builder = _builder(system, first, (radius, epsilon, workers), folder)
     growth = Growth(builder, system, first, radius, epsilon)
-    status = growth.run(Limits(charts, start + seconds, memory), progress)
+    status = growth.run(Limits(charts, start + seconds, memory), progress, folder)
     arrays = builder.arrays()
     return Atlas(
         system=system, radius=radius, epsilon=epsilon, status=status, seconds=time.perf_counter() - start, **arrays
     )
+
+
+def _builder(
+    system: AnySystem,
+    x0: NDArray[np.float64],
+    options: tuple[float, float, int],
+    folder: CheckpointFolder | None,
+) -> _core.AtlasBuilder:
+    """A builder at x0, or where a checkpoint left off."""
+    saved = folder.load() if folder else None
+    if saved is None:
+        return _core.AtlasBuilder(system, x0, *options)
+    builder = _core.AtlasBuilder.resume(system, saved, *options)
+    print(f"going on from the {builder.n_charts} charts of a checkpoint", file=sys.stderr)
+    return builder
 
 
 def optimize(
@@ -100,6 +122,7 @@ def optimize(
     max_seconds: float | None = None,
     max_bytes: float | None = None,
     threads: int | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
     progress: bool | None = None,
 ) -> Result:
     """Find the best grasp of a problem: trace all relevant grasps, then read a quality index on them.
@@ -122,6 +145,7 @@ def optimize(
         max_seconds: See :func:`build_atlas`.
         max_bytes: See :func:`build_atlas`.
         threads: See :func:`build_atlas`.
+        checkpoint: See :func:`build_atlas`.
         progress: See :func:`build_atlas`.
 
     Returns:
@@ -149,6 +173,7 @@ def optimize(
         max_seconds=max_seconds,
         max_bytes=max_bytes,
         threads=threads,
+        checkpoint=checkpoint,
         progress=progress,
     )
     start = time.perf_counter()

@@ -266,7 +266,7 @@ class Result:
         try:
             descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
             with os.fdopen(descriptor, "wb") as stream:
-                np.savez_compressed(
+                np.savez(  # compression would take longer than the atlas
                     stream,
                     header=json.dumps(header),
                     qualities=self.qualities,

@@ -46,14 +46,11 @@ std::vector<int> leaping_order(int count) {
 
 }  // namespace
 
-Atlas::Atlas(System& system, const double* x0, const AtlasOptions& options, int threads)
+Atlas::Atlas(System& system, const AtlasOptions& options, int threads)
     : system_(system),
       options_(options),
       charts_(system.configuration_size(), system.dimension() * system.tangent_size(), system.embedding_size()) {
   check_options(options, system);
-  for (int i = 0; i < system.configuration_size(); ++i)
-    if (!std::isfinite(x0[i])) throw Error("x0 holds a number that is not finite");
-  system.check_point(x0);
   for (int i = 0; i < std::max(threads, 1); ++i) {
     auto worker = std::make_unique<Worker>();
     if (i > 0) worker->system = system.clone();
@@ -61,8 +58,20 @@ Atlas::Atlas(System& system, const double* x0, const AtlasOptions& options, int 
     worker->expander = std::make_unique<Expander>(i > 0 ? *worker->system : system, options, charts_);
     workers_.push_back(std::move(worker));
   }
+}
+
+Atlas::Atlas(System& system, const double* x0, const AtlasOptions& options, int threads)
+    : Atlas(system, options, threads) {
+  for (int i = 0; i < system.configuration_size(); ++i)
+    if (!std::isfinite(x0[i])) throw Error("x0 holds a number that is not finite");
+  system.check_point(x0);
   workers_[0]->expander->start(x0);
   settle_order();
+}
+
+Atlas::Atlas(System& system, const Checkpoint& saved, const AtlasOptions& options, int threads)
+    : Atlas(system, options, threads) {
+  restore(saved);
 }
 
 std::int64_t Atlas::open_count() const {
@@ -197,6 +206,9 @@ void Atlas::finish_task(Worker& worker, const Task& task, int made) {
     else
       again_.push_back(task.slot);
   }
+  std::vector<int>& reopened = worker.expander->reopened();
+  again_.insert(again_.end(), reopened.begin(), reopened.end());
+  reopened.clear();
   worker.task = 0;
   changed_.notify_all();
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "graspatlas/continuation/charts.hpp"
+#include "graspatlas/continuation/checkpoint.hpp"
 #include "graspatlas/continuation/expander.hpp"
 #include "graspatlas/continuation/system.hpp"
 
@@ -31,6 +32,11 @@ class Atlas {
   /// Throws when x0 cannot be projected, breaks a bound, or the Jacobian there is rank deficient.
   /// A system that cannot be cloned is left to one thread.
   Atlas(System& system, const double* x0, const AtlasOptions& options, int threads = 1);
+
+  /// Goes on from a checkpoint, to the same atlas, to the bit. Throws when the checkpoint does not fit.
+  Atlas(System& system, const Checkpoint& saved, const AtlasOptions& options, int threads = 1);
+  /// All that is needed to go on from here later, with the charts from `first` on.
+  Checkpoint save(std::int64_t first) const;
 
   /// Expand until the atlas is complete, has `chart_limit` charts, or `seconds` have passed.
   void expand(std::int64_t chart_limit, double seconds);
@@ -72,6 +78,9 @@ class Atlas {
   };
   using Lock = std::unique_lock<std::mutex>;
 
+  /// With work space for its threads, and no chart.
+  Atlas(System& system, const AtlasOptions& options, int threads);
+  void restore(const Checkpoint& saved);
   void work(Worker& worker);
   bool take_task(Worker& worker, Task& task);
   void find_conflicts(Worker& worker, Task& task);
@@ -93,7 +102,7 @@ class Atlas {
   std::vector<int> generation_, turns_;  // slots of the charts to expand, and the order to take them in
   std::size_t position_ = 0;             // in turns_
   std::size_t next_first_ = 0;           // in order_: where the next generation begins
-  std::vector<int> again_;               // charts that made as many as one task may and are not done
+  std::vector<int> again_;               // charts that made as many as one task may, or were opened again
   std::int64_t task_count_ = 0;
 
   // State of one call of expand, guarded by mutex_.

@@ -69,7 +69,13 @@ void Expander::start(const double* x0) {
     throw Error("x0, projected onto the manifold, breaks the " + system_.bound_name(static_cast<int>(worst)) + " by " +
                 to_text(-slack_[worst]));
   }
-  add_chart(0);
+  add_chart(0, newton_.residual());
+}
+
+void Expander::put_back(const double* center, const double* basis, double residual, ChartKey key) {
+  x_new_.assign(center, center + x_size_);
+  Phi_new_.assign(basis, basis + static_cast<std::ptrdiff_t>(k_) * n_);
+  add_chart(key, residual);
 }
 
 bool Expander::inside_bounds(const double* x) {
@@ -89,7 +95,10 @@ int Expander::expand(int i, ChartKey key, int most) {
   int made = 0;
   while (made < most) {
     const int vertex = charts_[i].polytope.expandable_vertex(options_.radius);
-    if (vertex < 0) break;
+    if (vertex < 0) {
+      charts_[i].done = true;
+      break;
+    }
     if (expand_vertex(i, vertex, key + static_cast<ChartKey>(made))) ++made;
   }
   return made;
@@ -105,16 +114,20 @@ bool Expander::expand_vertex(int i, int vertex, ChartKey key) {
   for (double alpha = options_.radius; alpha >= options_.smallest_step * options_.radius; alpha *= options_.shrink) {
     reason = attempt(i, direction_.data(), alpha);
     if (reason == Closed::open) {
-      add_chart(key);
+      add_chart(key, newton_.residual());
       // The new neighbour cuts the vertex off; should rounding keep it, it must not be expanded again.
       for (int u = 0; u < polytope.vertex_count(); ++u)
-        if (std::equal(vertex_.begin(), vertex_.end(), polytope.vertex(u)))
-          polytope.close(u, static_cast<std::uint8_t>(Closed::curvature));
+        if (std::equal(vertex_.begin(), vertex_.end(), polytope.vertex(u))) close(i, u, Closed::curvature);
       return true;
     }
   }
-  polytope.close(vertex, static_cast<std::uint8_t>(reason));
+  close(i, vertex, reason);
   return false;
+}
+
+void Expander::close(int i, int vertex, Closed reason) {
+  charts_[i].polytope.close(vertex, static_cast<std::uint8_t>(reason));
+  charts_[i].closed = true;
 }
 
 // Projects a step of length alpha from chart i into x_new_, Phi_new_: eqs (14) to (18).
@@ -153,12 +166,12 @@ bool Expander::pass_tests(int i, const double* x_j, const double* Phi_j, double*
 }
 
 // The chart at x_new_: its own polytope first, which is stored when it has its size, then it is shown to others.
-void Expander::add_chart(ChartKey key) {
+void Expander::add_chart(ChartKey key, double residual) {
   const int j = charts_.add();
   Chart& chart = charts_[j];
   std::copy(x_new_.begin(), x_new_.end(), charts_.center(j));
   std::copy(Phi_new_.begin(), Phi_new_.end(), charts_.basis(j));
-  chart.residual = newton_.residual();
+  chart.residual = residual;
   chart.key = key;
   polytope_.reset(k_, half_width(k_, options_.radius));
   cut_by_bounds(j);
@@ -221,6 +234,10 @@ void Expander::meet_neighbours(int j) {
     polytope_bytes_ -= other.bytes();
     other.cut(p_ij_.data(), 0.5 * norm_ij, j, cut_scratch_);
     polytope_bytes_ += other.bytes();
+    if (charts_[i].done && charts_[i].closed && other.expandable_vertex(options_.radius) >= 0) {
+      charts_[i].done = false;
+      reopened_.push_back(i);
+    }
     polytope_.cut(p_ji_.data(), 0.5 * norm_ji, i, cut_scratch_);
     neighbours_.push_back(i);
   }

@@ -34,6 +34,12 @@ class Expander {
   /// Expand a chart until no vertex is left, or `most` charts were made, which get the keys from `key` on. Returns
   /// their number.
   int expand(int slot, ChartKey key, int most);
+  /// Charts that were done and have got a vertex to expand by that: a cut may make one beside a closed vertex. For the
+  /// caller to take.
+  std::vector<int>& reopened() { return reopened_; }
+
+  /// Adds a chart of an atlas that was saved; all that have smaller keys must be there.
+  void put_back(const double* center, const double* basis, double residual, ChartKey key);
 
   const double* embedding_of(int slot);
 
@@ -46,7 +52,8 @@ class Expander {
  private:
   Closed attempt(int i, const double* direction, double alpha);
   bool expand_vertex(int i, int vertex, ChartKey key);
-  void add_chart(ChartKey key);
+  void add_chart(ChartKey key, double residual);
+  void close(int i, int vertex, Closed reason);
   void cut_by_bounds(int j);
   void meet_neighbours(int j);
   void find_near();
@@ -70,7 +77,7 @@ class Expander {
   Polytope polytope_;
   Polytope::Scratch cut_scratch_;
   Neighbours::Scratch near_scratch_;
-  std::vector<int> near_, neighbours_;
+  std::vector<int> near_, neighbours_, reopened_;
   std::vector<std::pair<ChartKey, int>> sorted_;
 };
 

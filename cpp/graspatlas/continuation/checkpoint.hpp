@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "graspatlas/continuation/charts.hpp"
+
+namespace graspatlas {
+
+/// What an atlas in the making must keep to be made anew, to the bit, without projecting its charts again.
+///
+/// Polytopes are not kept: charts that are put back in their order cut each other as they did. Charts are named by
+/// their numbers.
+struct Checkpoint {
+  /// Charts, from one on: centres [n x configuration_size], tangent bases [n x dimension x tangent_size].
+  std::vector<double> centers, bases, residuals;
+  std::vector<ChartKey> keys;
+
+  /// Vertices that were closed: chart, position [m x dimension], and reason.
+  std::vector<std::int32_t> closed_charts;
+  std::vector<double> closed_vertices;
+  std::vector<std::uint8_t> closed_reasons;
+
+  /// The generation that is being expanded, how much of it is done, and charts that come again in the next one.
+  std::vector<std::int32_t> generation, again;
+  std::int64_t position = 0, next_first = 0, task_count = 0;
+};
+
+}  // namespace graspatlas

@@ -1,0 +1,108 @@
+"""Checkpoints of an atlas in the making, from which it goes on to the same result, to the bit."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graspatlas import _core
+from graspatlas.errors import GraspAtlasError
+from graspatlas.files import replaced
+from graspatlas.systems import AnySystem
+
+__all__ = ["CheckpointFolder", "run_digest"]
+
+#: Changes when a checkpoint of an older version would not lead to the same atlas.
+VERSION = 1
+#: Arrays of which each file of a checkpoint holds the part that came after the file before it.
+_GROWING = ("centers", "bases", "residuals", "keys")
+#: A step away from x0 at which the system is looked at, to tell it from others [units of the tangent space].
+_STEP = 1e-3
+
+
+def run_digest(system: AnySystem, x0: NDArray[np.float64], radius: float, epsilon: float) -> str:
+    """Digest that tells runs apart: the options, and the system's numbers at x0 and a step away from it."""
+    digest = hashlib.sha256(json.dumps([VERSION, type(system).__name__, radius, epsilon]).encode())
+    away = system.integrate(x0, np.full(system.tangent_size, _STEP))
+    for x in (x0, away):
+        for array in (x, system.evaluate_residual(x), system.evaluate_jacobian(x), system.slack(x)):
+            digest.update(np.ascontiguousarray(array, float).tobytes())
+    digest.update(np.ascontiguousarray(system.bound_normals).tobytes())
+    return digest.hexdigest()
+
+
+class CheckpointFolder:
+    """A folder of numbered files: each holds the charts that came after those of the file before it.
+
+    So a long run writes each chart once. A file is written beside its place and renamed, and what it says of the state
+    of the run replaces what older files say; a file that a killed run left unfinished is not there.
+
+    Args:
+        folder: The folder; made when the first file is written.
+        digest: Of the run, see :func:`run_digest`.
+    """
+
+    def __init__(self, folder: str | os.PathLike[str], digest: str) -> None:
+        self.folder = Path(folder)
+        self.digest = digest
+        self._n_files = self._n_charts = 0
+
+    def load(self) -> dict[str, Any] | None:
+        """What ``AtlasBuilder.resume`` needs; None when there is no checkpoint.
+
+        Raises:
+            GraspAtlasError: If a file is damaged, or the checkpoint is of another run.
+        """
+        paths = sorted(self.folder.glob("*.npz"))
+        parts = [self._read(path) for path in paths]
+        if not parts:
+            return None
+        out = {**parts[-1], **{name: np.concatenate([part[name] for part in parts]) for name in _GROWING}}
+        self._n_files, self._n_charts = len(parts), len(out["keys"])
+        return out
+
+    def _read(self, path: Path) -> dict[str, Any]:
+        try:
+            with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+                part = {name: file[name] for name in file.files}
+            digest = str(part.pop("digest"))
+        except Exception:  # a damaged archive fails in many ways, none of which executes anything
+            raise GraspAtlasError(
+                f"'{path}' is damaged or no checkpoint; delete '{self.folder}' to begin anew"
+            ) from None
+        if digest != self.digest:
+            raise GraspAtlasError(
+                f"'{self.folder}' holds the checkpoint of another problem, of other options or of another version: "
+                "finish that run, delete the folder, or choose another one"
+            )
+        return part
+
+    def write(self, builder: _core.AtlasBuilder) -> None:
+        """Write the charts that came since the last file, and the state of the run.
+
+        Raises:
+            GraspAtlasError: If the file cannot be written.
+        """
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise GraspAtlasError(f"cannot make folder '{self.folder}': {error.strerror or error}") from None
+        with replaced(self.folder / f"{self._n_files:06}.npz") as stream:
+            part: dict[str, Any] = dict(builder.save(self._n_charts))
+            np.savez(stream, digest=self.digest, **part)
+        self._n_files += 1
+        self._n_charts = builder.n_charts
+
+    @staticmethod
+    def remove(folder: Path) -> None:
+        """Remove the files of a checkpoint, and the folder if nothing else is in it."""
+        for path in folder.glob("[0-9]*.npz"):
+            path.unlink()
+        if folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
