@@ -16,6 +16,7 @@ from scipy.spatial import ConvexHull, cKDTree
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.systems import AnySystem
+from graspatlas.tables import number_array
 
 __all__ = ["BOX_TAG", "Atlas", "Closed", "Status"]
 
@@ -24,6 +25,8 @@ IntArray = NDArray[np.int64]
 
 #: Facet tag of the initial box; a tag t >= 0 is the neighbour's index, t <= -2 is bound -2 - t.
 BOX_TAG = -1
+#: Coordinates of a point that is looked up are smaller, so that their squares do not overflow.
+LARGEST = 1e100
 #: Facets of a polygon shorter than this share of the radius are left out of the surface's triangulation.
 SHORT_FACET = 0.05
 
@@ -170,7 +173,7 @@ class Atlas:
         Returns:
             The point [configuration_size], or None when Newton's method does not converge.
         """
-        x = _core.project(self.system, self.centers[chart], self.bases[chart], np.asarray(u, float))
+        x = _core.project(self.system, self.centers[chart], self.bases[chart], number_array(u, "u"))
         return None if x is None else np.asarray(x)
 
     @cached_property
@@ -202,9 +205,9 @@ class Atlas:
             The chart's index and the distance from the point's image to the polytope, 0 inside; (-1, inf) when no chart
             within reach has the point near its tangent space.
         """
-        point = np.asarray(x, float)
-        if not np.isfinite(point).all():
-            raise GraspAtlasError("x holds a number that is not finite")
+        point = number_array(x, "x")
+        if not (np.abs(point) < LARGEST).all():
+            raise GraspAtlasError(f"x holds a number that is not finite, or not below {LARGEST:g}")
         best, best_distance = -1, np.inf
         for chart in sorted(self._index.query_ball_point(self.system.embed(point), 2.0 * self.radius)):
             displacement = self.system.difference(self.centers[chart], point)

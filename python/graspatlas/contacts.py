@@ -10,9 +10,12 @@ import numpy as np
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.patches import Patch, patch_from_dict
-from graspatlas.tables import checked_table, number, numbers
+from graspatlas.tables import checked_instance, checked_table, number, number_array, numbers
 
 __all__ = ["Contact", "FirstGrasp"]
+
+#: Numbers of a first grasp are smaller [rad or m]: larger ones are mistakes, and their squares may overflow.
+LARGEST = 1e9
 
 
 @dataclass(frozen=True)
@@ -34,11 +37,16 @@ class Contact:
     hand_frozen: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for patch, frozen in ((self.object, self.frozen), (self.hand, self.hand_frozen)):
-            for name, value in frozen.items():
+        checked_instance(self.frame, str, "a contact's frame")
+        for side, patch, frozen in (
+            ("object", self.object, self.frozen),
+            ("hand", self.hand, self.hand_frozen),
+        ):
+            checked_instance(patch, Patch, f"the {side}'s side of a contact", "graspatlas.patches")
+            for name, value in checked_table(frozen, "frozen", (), None).items():
                 if name not in patch.parameters:
                     raise unknown_name("parameter", name, patch.parameters, f"one of a {patch.kind} patch's")
-                if not np.isfinite(value):
+                if not np.isfinite(number(value, f"frozen parameter '{name}'")):
                     raise GraspAtlasError(f"parameter '{name}' is frozen at {value}; it must be finite")
 
     def free(self) -> list[tuple[Patch, str]]:
@@ -90,17 +98,16 @@ class FirstGrasp:
 
     def __post_init__(self) -> None:
         checked_table(self.joints, "x1's joints", (), None)
-        numbers = [
-            *self.joints.values(),
-            *self.object_xyz,
-            *self.object_quat_xyzw,
-            *(self.parameters or ()),
-        ]
-        if not np.isfinite(np.asarray(numbers, float)).all():
-            raise GraspAtlasError("x1 holds a number that is not finite")
-        if len(self.object_xyz) != 3 or len(self.object_quat_xyzw) != 4:
-            raise GraspAtlasError("x1 needs object_xyz of 3 numbers and object_quat_xyzw of 4")
-        norm = float(np.linalg.norm(self.object_quat_xyzw))
+        joints = [number(value, f"joint '{name}' of x1") for name, value in self.joints.items()]
+        xyz = number_array(self.object_xyz, "object_xyz")
+        quaternion = number_array(self.object_quat_xyzw, "object_quat_xyzw")
+        parameters = number_array(() if self.parameters is None else self.parameters, "the parameters of x1")
+        if xyz.shape != (3,) or quaternion.shape != (4,) or parameters.ndim != 1:
+            raise GraspAtlasError("x1 needs object_xyz of 3 numbers, object_quat_xyzw of 4 and a row of parameters")
+        values = np.concatenate([joints, xyz, quaternion, parameters])
+        if not (np.abs(values) < LARGEST).all():
+            raise GraspAtlasError(f"x1 holds a number that is not finite, or not below {LARGEST:g}")
+        norm = float(np.linalg.norm(quaternion))
         if norm < 1e-6:
             raise GraspAtlasError("x1 has a quaternion of length zero")
         # One that is unit to rounding stays as it came, so that a stored problem is the same problem.

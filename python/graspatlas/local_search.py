@@ -24,6 +24,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasps
 from graspatlas.quality import evaluate
 from graspatlas.result import Result
+from graspatlas.tables import checked_instance
 
 __all__ = ["Climb", "Peak", "climb", "local_maxima", "peaks_of"]
 
@@ -60,6 +61,7 @@ def local_maxima(result: Result) -> IntArray:
     Returns:
         Charts [p], by decreasing quality.
     """
+    checked_instance(result, Result, "result", "graspatlas.optimize")
     atlas, q = result.atlas, np.where(result.feasible, result.qualities, -np.inf)
     i, j = atlas.neighbour_pairs.T
     equal = q[i] == q[j]
@@ -119,8 +121,8 @@ def climb(result: Result, chart: int, *, max_steps: int = MAX_STEPS) -> Climb:
     Raises:
         GraspAtlasError: If there is no such chart, or the index fails.
     """
-    if not 0 <= chart < result.atlas.n_charts:
-        raise GraspAtlasError(f"chart {chart} does not exist; the atlas has charts 0 to {result.atlas.n_charts - 1}")
+    checked_instance(result, Result, "result", "graspatlas.optimize")
+    result.grasp(chart)
     if isinstance(max_steps, bool) or not isinstance(max_steps, int | np.integer) or max_steps < 1:
         raise GraspAtlasError(f"max_steps must be a whole number of at least 1, got {max_steps!r}")
     radius = result.atlas.radius

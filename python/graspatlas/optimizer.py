@@ -20,7 +20,8 @@ from graspatlas.problem import Problem
 from graspatlas.quality import Quality, evaluate, find_index
 from graspatlas.requirements import Require, screen
 from graspatlas.result import Result
-from graspatlas.systems import AnySystem
+from graspatlas.systems import AnySystem, check_jacobian
+from graspatlas.tables import number, number_array, shown
 
 __all__ = ["build_atlas", "optimize"]
 
@@ -70,6 +71,7 @@ def build_atlas(
     limit = float("inf") if max_seconds is None else _positive("max_seconds", max_seconds)
     start = time.perf_counter()
     builder = _core.AtlasBuilder(system, _numbers("x0", x0), radius, epsilon)
+    check_jacobian(system, builder.arrays()["centers"][0])
     status = _grow(builder, charts, start + limit, progress)
     seconds = time.perf_counter() - start
     return Atlas(
@@ -191,19 +193,16 @@ def _with_defaults(problem: Problem, chosen: dict[str, Any]) -> dict[str, Any]:
 
 
 def _numbers(name: str, value: ArrayLike) -> np.ndarray[Any, np.dtype[np.float64]]:
-    try:
-        return np.asarray(value, float)
-    except (TypeError, ValueError):
-        raise GraspAtlasError(f"{name} must be an array of numbers, got {value!r}") from None
+    return number_array(value, name)
 
 
 def _positive(name: str, value: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < float(value) < float("inf"):
-        raise GraspAtlasError(f"{name} must be a positive number, got {value!r}")
+    if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < number(value, name) < float("inf"):
+        raise GraspAtlasError(f"{name} must be a positive number, got {shown(value)}")
     return float(value)
 
 
 def _whole(name: str, value: int) -> int:
     if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < 1:
-        raise GraspAtlasError(f"{name} must be a whole number of at least 1, got {value!r}")
-    return int(value)
+        raise GraspAtlasError(f"{name} must be a whole number of at least 1, got {shown(value)}")
+    return min(int(value), _NO_LIMIT)

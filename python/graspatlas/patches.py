@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError, unknown_name
-from graspatlas.tables import number_array
+from graspatlas.tables import number, number_array
 
 __all__ = ["Cone", "Cylinder", "Patch", "Plane", "Point", "Revolution", "patch_from_dict"]
 
@@ -24,12 +24,16 @@ Array = NDArray[np.float64]
 Vector3 = tuple[float, float, float]
 Interval = tuple[float, float]
 EVERYWHERE: Interval = (-np.inf, np.inf)
+#: Lengths of a patch are smaller [m]: larger ones are mistakes, and their squares may overflow.
+LARGEST = 1e9
+#: Heights of an outline are farther apart [m], or its slope would be no number.
+CLOSEST = 1e-9
 
 
 def _vector(value: ArrayLike, what: str, *, unit: bool = False) -> Vector3:
     array = number_array(value, what)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise GraspAtlasError(f"{what} must be three finite numbers, got {value!r}")
+    if array.shape != (3,) or not (np.abs(array) < LARGEST).all():
+        raise GraspAtlasError(f"{what} must be three finite numbers below {LARGEST:g}, got {value!r}")
     if unit:
         length = float(np.linalg.norm(array))
         if length < 1e-9:
@@ -48,8 +52,8 @@ def _interval(value: Sequence[float], what: str) -> Interval:
 
 def _pair(value: Sequence[float], what: str) -> tuple[float, float]:
     array = number_array(value, what)
-    if array.shape != (2,) or not np.isfinite(array).all():
-        raise GraspAtlasError(f"{what} must be two finite numbers, got {value!r}")
+    if array.shape != (2,) or not (np.abs(array) < LARGEST).all():
+        raise GraspAtlasError(f"{what} must be two finite numbers below {LARGEST:g}, got {value!r}")
     return (float(array[0]), float(array[1]))
 
 
@@ -201,7 +205,7 @@ class _Turned(Patch):
 
     def _check_radius(self) -> None:
         """The radius must not be negative anywhere in the interval of v, past an apex or between points."""
-        low, high = self.v_interval or self.default_v_interval()
+        low, high = np.clip(self.v_interval or self.default_v_interval(), -LARGEST, LARGEST)
         if not (self.radius_at(np.linspace(low, high, 1001)) >= 0.0).all():
             raise GraspAtlasError(f"the radius is negative in v_interval ({low:g}, {high:g}): end it before the apex")
 
@@ -270,8 +274,8 @@ class Cylinder(_Turned):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if isinstance(self.radius, str) or not (np.isfinite(self.radius) and self.radius > 0.0):
-            raise GraspAtlasError(f"radius must be positive, got {self.radius}")
+        if not 0.0 < number(self.radius, "radius") < LARGEST:
+            raise GraspAtlasError(f"radius must be positive and below {LARGEST:g}, got {self.radius}")
 
     def default_v_interval(self) -> Interval:
         """All heights."""
@@ -301,8 +305,10 @@ class Cone(_Turned):
         object.__setattr__(self, "heights", _pair(self.heights, "heights"))
         object.__setattr__(self, "radii", _pair(self.radii, "radii"))
         (h0, h1), (r0, r1) = self.heights, self.radii
-        if h0 == h1:
-            raise GraspAtlasError(f"a cone needs two different heights, got {self.heights}")
+        if not abs(h1 - h0) > CLOSEST:
+            raise GraspAtlasError(
+                f"a cone needs two different heights, more than {CLOSEST:g} m apart, got {self.heights}"
+            )
         if min(r0, r1) < 0.0 or max(r0, r1) <= 0.0:
             raise GraspAtlasError(f"a cone needs radii that are not negative, got {self.radii}")
         self._check_radius()
@@ -333,8 +339,11 @@ class Revolution(_Turned):
         object.__setattr__(self, "radii", tuple(map(float, number_array(self.radii, "radii").ravel())))
         if len(self.heights) < 2 or len(self.heights) != len(self.radii):
             raise GraspAtlasError("an outline needs at least two heights and as many radii")
-        if not (np.diff(self.heights) > 0.0).all() or not (np.array(self.radii) > 0.0).all():
-            raise GraspAtlasError("an outline needs ascending heights and positive radii")
+        radii = np.array(self.radii)
+        if not (np.abs(self.heights) < LARGEST).all() or not (np.diff(self.heights) > CLOSEST).all():
+            raise GraspAtlasError(f"an outline needs ascending heights, finite and more than {CLOSEST:g} m apart")
+        if not ((radii > 0.0) & (radii < LARGEST)).all():
+            raise GraspAtlasError(f"an outline needs positive radii below {LARGEST:g}")
         self._check_radius()
 
     def outline(self) -> tuple[Array, Array]:

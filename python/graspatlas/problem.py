@@ -18,7 +18,7 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand import Body, Hand
 from graspatlas.motions import HandMotions
 from graspatlas.patches import Patch
-from graspatlas.tables import checked_table, number
+from graspatlas.tables import checked_instance, checked_table, number
 
 __all__ = ["Problem"]
 
@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 #: How far a first grasp may miss a contact, since it is projected onto the contacts anyway [m], [rad].
 CONTACT_TOLERANCE = 1e-3
 NORMAL_TOLERANCE = 0.05
+#: Smallest and largest length that may count as much as one radian [m].
+LENGTH_SCALES = (1e-6, 1e6)
 #: Ways in which the object can move.
 OBJECT_JOINTS = ("free_flyer", "planar")
 #: Options of `optimize` that a problem may give.
@@ -68,11 +70,13 @@ class Problem:
     source: str = ""
 
     def __post_init__(self) -> None:
+        self._check_types()
         object.__setattr__(self, "contacts", tuple(self.contacts))
         if not self.contacts:
             raise GraspAtlasError(f"problem '{self.name}' has no contact")
-        if not (np.isfinite(self.length_scale) and self.length_scale > 0.0):
-            raise GraspAtlasError(f"length_scale must be positive, got {self.length_scale}")
+        low, high = LENGTH_SCALES
+        if not low <= self.length_scale <= high:
+            raise GraspAtlasError(f"length_scale must lie between {low:g} and {high:g} m, got {self.length_scale}")
         if self.object_joint not in OBJECT_JOINTS:
             raise unknown_name("object joint", self.object_joint, OBJECT_JOINTS)
         self._check_joints()
@@ -80,6 +84,17 @@ class Problem:
         for contact in self.contacts:
             self.hand.frame(contact.frame)
         self._check_x1()
+
+    def _check_types(self) -> None:
+        checked_instance(self.hand, Hand, "hand", "Hand.from_urdf")
+        checked_instance(self.object, Body, "object", "Body.from_urdf")
+        checked_instance(self.contacts, (list, tuple), "contacts")
+        for contact in self.contacts:
+            checked_instance(contact, Contact, "a contact")
+        checked_instance(self.x1, FirstGrasp, "x1")
+        checked_instance(self.motions, (HandMotions, type(None)), "motions", "HandMotions.from_samples")
+        checked_table(self.defaults, "defaults", (), DEFAULTS)
+        number(self.length_scale, "length_scale")
 
     def _check_joints(self) -> None:
         for name in self.x1.joints:

@@ -17,6 +17,7 @@ from graspatlas import _core
 from graspatlas.collision import CollisionChecker
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.grasps import Grasps
+from graspatlas.tables import checked_instance, shown
 
 __all__ = [
     "REQUIREMENTS",
@@ -30,6 +31,9 @@ __all__ = [
 ]
 
 Flags = NDArray[np.bool_]
+
+#: Values of a requirement are at most this.
+LARGEST = 1e9
 
 
 @dataclass(frozen=True)
@@ -53,10 +57,10 @@ class Requirement:
     def _check(self, positive: Sequence[str], finite: Sequence[str] = ()) -> None:
         for attribute in (*positive, *finite):
             value = getattr(self, attribute)
-            low = 0.0 if attribute in positive else -np.inf
-            if isinstance(value, bool) or not isinstance(value, int | float) or not low < value < np.inf:
+            low = 0.0 if attribute in positive else -LARGEST
+            if isinstance(value, bool) or not isinstance(value, int | float) or not low < value <= LARGEST:
                 kind = "positive" if attribute in positive else "finite"
-                raise GraspAtlasError(f"{attribute} of requirement {self.name} must be {kind}, got {value!r}")
+                raise GraspAtlasError(f"{attribute} of requirement {self.name} must be {kind}, got {shown(value)}")
 
 
 @dataclass(frozen=True)
@@ -176,6 +180,13 @@ def screen(requirements: Sequence[Require], grasps: Grasps) -> tuple[Flags, dict
     Raises:
         GraspAtlasError: If a predicate raises or returns the wrong shape.
     """
+    checked_instance(requirements, (list, tuple), "require")
+    for requirement in requirements:
+        if not isinstance(requirement, Requirement) and not callable(requirement):
+            raise GraspAtlasError(
+                f"a requirement is one of {', '.join(REQUIREMENTS)} or a function of a grasp, not "
+                f"{shown(requirement)}; requirements.parse_requirement reads text"
+            )
     left = np.arange(len(grasps))
     refused: dict[str, int] = {}
     for requirement in sorted(requirements, key=lambda r: r.cost if isinstance(r, Requirement) else 1):

@@ -181,7 +181,7 @@ void atlases() {
   in_slices(sphere_3, {0.0, 0.0, 0.0, 1.0}, 0.6, 0.4);
 
   // Charts far larger than the manifold, far smaller, and thresholds at their ends.
-  for (double radius : {1e-300, 1e-12, 3.0, 1e6, 1e99})
+  for (double radius : {1e-7, 3.0, 1e6, 1e99})
     for (double epsilon : {1e-12, 0.5, 1.0 - 1e-12}) {
       Atlas atlas(sphere, std::vector<double>{0.0, 0.6, 0.8}.data(), options(radius, epsilon));
       atlas.expand(200, 0.2);

@@ -54,7 +54,7 @@ class Throwing : public graspatlas::Sphere {
 void misuse() {
   graspatlas::Sphere sphere(3);
   const std::vector<double> pole = {0.0, 0.0, 1.0};
-  for (double bad : {0.0, -1.0, kNaN, kInfinity, 1e300}) refuse([&] { build(sphere, pole, bad); }, "radius");
+  for (double bad : {0.0, -1.0, 1e-300, kNaN, kInfinity, 1e300}) refuse([&] { build(sphere, pole, bad); }, "radius");
   for (double bad : {0.0, -1.0, kNaN, kInfinity, 1.0}) refuse([&] { build(sphere, pole, 0.1, bad); }, "epsilon");
   for (double bad : {kNaN, kInfinity}) refuse([&] { build(sphere, {bad, 0.0, 0.0}); }, "not finite");
   refuse([&] { build(sphere, {0.0, 0.0, 0.0}); }, "rank");

@@ -52,6 +52,10 @@ void check(const Polytope& polytope, const std::vector<HalfSpace>& made, double 
     for (const HalfSpace& h : made)
       require(dot(h.normal.data(), polytope.vertex(v), k) <= h.offset + 1e-9, "vertices lie in every half-space");
     require(polytope.contains(polytope.vertex(v), 1e-9), "vertices lie in every facet's half-space");
+    int on = 0;
+    for (int f = 0; f < polytope.facet_slots(); ++f)
+      on += polytope.facet_active(f) && polytope.offset(f) - dot(polytope.normal(f), polytope.vertex(v), k) < 1e-9;
+    require(on >= k, "vertices lie on k facets");
   }
   const std::vector<double> towards = random.direction(k);
   double reach = 0.0;

@@ -12,9 +12,14 @@ namespace {
 
 // A centre may miss a bound by rounding only.
 constexpr double kBoundTolerance = 1e-10;
+// Beside smaller charts rounding and the tolerances of points and polytopes are no longer small.
+constexpr double kSmallestRadius = 1e-7;
 
 void check_options(const AtlasOptions& options, const System& system) {
   if (!(options.radius > 0.0)) throw Error("radius must be positive, got " + to_text(options.radius));
+  if (!(options.radius >= kSmallestRadius))
+    throw Error("radius must be at least " + to_text(kSmallestRadius) + ", got " + to_text(options.radius) +
+                "; scale the variables of a smaller manifold");
   if (!(options.radius < system.radius_limit()))
     throw Error("radius must be below " + to_text(system.radius_limit()) + " for this system, got " +
                 to_text(options.radius));

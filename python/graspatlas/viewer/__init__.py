@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.result import Result
+from graspatlas.tables import checked_instance
 
 if TYPE_CHECKING:
     import meshcat
@@ -35,6 +36,7 @@ def view(result: Result, *, open_browser: bool = True, wait: bool = True) -> mes
     """
     from graspatlas.viewer.live import show
 
+    checked_instance(result, Result, "result", "graspatlas.optimize")
     return show(result, open_browser=open_browser, wait=wait)
 
 
@@ -54,6 +56,7 @@ def export_html(result: Result, path: str | os.PathLike[str]) -> None:
     from graspatlas.viewer.page import page
     from graspatlas.viewer.scene import Scene
 
+    checked_instance(result, Result, "result", "graspatlas.optimize")
     with replaced(path) as stream:
         stream.write(page(Scene(result)).encode("utf-8"))
 
@@ -74,6 +77,7 @@ def save_picture(result: Result, path: str | os.PathLike[str], *, width: int = 1
     from graspatlas.viewer.picture import check_size, draw
     from graspatlas.viewer.scene import Scene
 
+    checked_instance(result, Result, "result", "graspatlas.optimize")
     if os.path.splitext(path)[1].lower() != ".png":
         raise GraspAtlasError(f"a picture's name must end in .png, not '{os.fspath(path)}'")
     check_size(width, height)
