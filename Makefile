@@ -10,7 +10,7 @@ $(BIN)/pybind11-stubgen graspatlas._core --output-dir $(1) --numpy-array-use-typ
 $(BIN)/ruff format --quiet --config pyproject.toml $(1)/graspatlas/_core.pyi
 endef
 
-.PHONY: demo test sanitize bench lint stubs format clean
+.PHONY: demo test sanitize bench compare lint stubs format clean
 
 demo: $(VENV)/.installed
 	$(BIN)/graspatlas optimize schunk_can --require force_closure --require collision_free --output out/schunk_can
@@ -29,6 +29,11 @@ sanitize: $(VENV)/.tools
 
 bench: $(VENV)/.tools
 	$(BIN)/python benchmarks/run.py
+
+# Against OMPL, SciPy and NumPy, and how cost grows; writes benchmarks/RESULTS.md in about five minutes.
+compare: $(VENV)/.tools
+	$(BIN)/python -m pip install --quiet "graspatlas[compare]"
+	$(BIN)/python benchmarks/compare.py
 
 lint: $(VENV)/.tools
 	$(BIN)/ruff check .
