@@ -228,7 +228,7 @@ def machine() -> Iterator[str]:
             found.append(f"{package} {ga.__version__}" if package == "graspatlas" else f"{package} -")
     cores = len(os.sched_getaffinity(0))
     load = os.getloadavg()[0]
-    yield f"Machine: {cpu}, {cores} cores, {memory:.0f} GiB; {platform.system()}, load {load:.1f} at the start. "
+    yield f"Machine: {cpu}, {cores} cores, {memory:.0f} GiB; {platform.system()}, load {load:.1f} at the start."
     yield f"Python {platform.python_version()}, {', '.join(found)}."
 
 
@@ -236,7 +236,7 @@ def report() -> Iterator[str]:
     """All lines of the report, as they are ready."""
     yield "# Comparisons"
     yield ""
-    yield "Written by `make compare`; times are medians of a few runs, of the processor where nothing else is said; "
+    yield "Written by `make compare`; times are medians of a few runs, of the processor where nothing else is said;"
     yield "ratios are of times of one and the same run."
     yield ""
     yield from machine()
