@@ -115,14 +115,15 @@ class Atlas:
             whole = name in ("facet_start", "facet_tags", "vertex_start", "vertex_closed", "neighbour_pairs")
             if array.shape != shape or array.dtype.kind not in ("iu" if whole else "f"):
                 raise GraspAtlasError(f"array '{name}' has shape {array.shape} and type {array.dtype}, not {shape}")
-            if not whole and not np.isfinite(array).all():
-                raise GraspAtlasError(f"array '{name}' holds a number that is not finite")
+            if not whole and not (np.abs(array) < LARGEST).all():
+                raise GraspAtlasError(f"array '{name}' holds a number that is not finite, or not below {LARGEST:g}")
         ends_fit = all(
-            start[0] == 0 and start[-1] == end and (np.diff(start) >= 0).all()
+            start[0] == 0 and start[-1] == end and (np.diff(start) > k).all()
             for start, end in ((self.facet_start, facets), (self.vertex_start, vertices))
         )
         pairs = self.neighbour_pairs
-        in_range = (pairs >= 0).all() and (pairs < n).all() and (self.facet_tags < n).all()
+        in_order = (pairs[:, 0] < pairs[:, 1]).all() and len(np.unique(pairs, axis=0)) == len(pairs)
+        in_range = in_order and (pairs >= 0).all() and (pairs < n).all() and (self.facet_tags < n).all()
         if n == 0 or not ends_fit or not in_range:
             raise GraspAtlasError("its charts, facets and neighbours do not fit together")
 

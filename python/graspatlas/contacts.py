@@ -73,7 +73,10 @@ class Contact:
         """
         table = checked_table(data, "a contact", ("frame", "hand", "object"), ("frozen", "hand_frozen"))
         frozen, hand_frozen = (
-            {name: number(value, f"frozen parameter '{name}'") for name, value in (table.get(key) or {}).items()}
+            {
+                name: number(value, f"frozen parameter '{name}'")
+                for name, value in checked_table(table.get(key) or {}, key, (), None).items()
+            }
             for key in ("frozen", "hand_frozen")
         )
         patches = [patch_from_dict(table[key]) for key in ("hand", "object")]

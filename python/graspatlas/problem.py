@@ -18,7 +18,7 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand import Body, Hand
 from graspatlas.motions import HandMotions
 from graspatlas.patches import Patch
-from graspatlas.tables import checked_instance, checked_table, number
+from graspatlas.tables import checked_instance, checked_table, number, shown
 
 __all__ = ["Problem"]
 
@@ -194,7 +194,7 @@ class Problem:
         if isinstance(dimension, bool) or not isinstance(dimension, int | np.integer) or not 1 <= dimension <= t:
             raise GraspAtlasError(
                 f"dimension must be a whole number from 1 to {t}, the dimension of all grasps of problem "
-                f"'{self.name}'; got {dimension!r}"
+                f"'{self.name}'; got {shown(dimension)}"
             )
         s = t - int(dimension)
         if s > 0 and self.motions is None:

@@ -156,14 +156,14 @@ def parse_requirement(text: str) -> Requirement:
         raise unknown_name("requirement", name, REQUIREMENTS)
     attributes = [field.name for field in fields(REQUIREMENTS[name])]
     if len(values) > len(attributes):
-        raise GraspAtlasError(f"requirement {name} has the values {', '.join(attributes)}; got '{text}'")
+        raise GraspAtlasError(f"requirement {name} has the values {', '.join(attributes)}; got {shown(text)}")
     try:
         return REQUIREMENTS[name](*map(float, values))
     except ValueError as error:
         if isinstance(error, GraspAtlasError):
             raise
         raise GraspAtlasError(
-            f"requirement '{text}' holds a value that is no number; it is {name}:{':'.join(attributes)}"
+            f"requirement {shown(text)} holds a value that is no number; it is {name}:{':'.join(attributes)}"
         ) from None
 
 
