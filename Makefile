@@ -10,7 +10,7 @@ $(BIN)/pybind11-stubgen graspatlas._core --output-dir $(1) --numpy-array-use-typ
 $(BIN)/ruff format --quiet --config pyproject.toml $(1)/graspatlas/_core.pyi
 endef
 
-.PHONY: demo test bench lint stubs format clean
+.PHONY: demo test sanitize bench compare lint stubs format clean
 
 demo: $(VENV)/.installed
 	$(BIN)/graspatlas optimize schunk_can --require force_closure --require collision_free --output out/schunk_can
@@ -20,8 +20,20 @@ demo: $(VENV)/.installed
 test: $(VENV)/.tools
 	$(BIN)/python -m pytest
 
+# The C++ core under the compiler's sanitizers; SANITIZE=thread looks for data races instead.
+SANITIZE ?= address,undefined
+sanitize: $(VENV)/.tools
+	$(BIN)/cmake -Wno-dev -S tests/sanitize -B build/sanitize -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python -DSANITIZE=$(SANITIZE)
+	$(BIN)/cmake --build build/sanitize --parallel 2
+	build/sanitize/sanitize
+
 bench: $(VENV)/.tools
 	$(BIN)/python benchmarks/run.py
+
+# Against OMPL, SciPy and NumPy, and how cost grows; writes benchmarks/RESULTS.md in about five minutes.
+compare: $(VENV)/.tools
+	$(BIN)/python -m pip install --quiet "graspatlas[compare]"
+	$(BIN)/python benchmarks/compare.py
 
 lint: $(VENV)/.tools
 	$(BIN)/ruff check .
@@ -49,7 +61,7 @@ $(VENV)/.installed: $(VENV)/bin/python $(SOURCES)
 	touch $@
 
 $(VENV)/.tools: $(VENV)/bin/python $(SOURCES)
-	$(BIN)/python -m pip install ".[test,lint,stubs]"
+	$(BIN)/python -m pip install ".[test,lint,stubs,sanitize]"
 	touch $@ $(VENV)/.installed
 
 clean:

@@ -213,7 +213,7 @@ PROBLEM_FILES = {
     "negative length scale": (put(-1.0, "length_scale"), ["length_scale"]),
     "length scale of text": (put("wide", "length_scale"), ["length_scale"]),
     "negative radius of the can": (put(-0.02, "contacts", 0, "object", "radius"), ["radius"]),
-    "huge can": (put(1e300, "contacts", 0, "object", "radius"), ["x1", "mm"]),
+    "huge can": (put(1e8, "contacts", 0, "object", "radius"), ["x1", "mm"]),
     "motions of other joints": (put("little_dip", "hand_motions", "joints", 0), ["little_dip"]),
     "motions with NaN": (put(float("nan"), "hand_motions", "mean", 0), ["finite"]),
     "motions of text": (put("a", "hand_motions", "mean", 0), ["hand_motions"]),

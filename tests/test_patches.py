@@ -206,7 +206,7 @@ WRONG = {
     "interval of one": ({"type": "cylinder", "radius": 1.0, "u_interval": [1]}, "u_interval"),
     "interval of NaN": ({"type": "cylinder", "radius": 1.0, "u_interval": [float("nan"), 1]}, "u_interval"),
     "interval of text": ({"type": "cylinder", "radius": 1.0, "u_interval": ["a", "b"]}, "interval"),
-    "flat cone": ({"type": "cone", "heights": [1, 1], "radii": [1, 2]}, "different heights"),
+    "flat cone": ({"type": "cone", "heights": [1, 1], "radii": [1, 2]}, "two heights"),
     "pointless cone": ({"type": "cone", "heights": [0, 1], "radii": [0, 0]}, "radii"),
     "negative cone": ({"type": "cone", "heights": [0, 1], "radii": [-1, 1]}, "radii"),
     "cone of three": ({"type": "cone", "heights": [0, 1, 2], "radii": [1, 1, 1]}, "cone"),

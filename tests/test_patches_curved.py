@@ -198,7 +198,7 @@ BALL = {"type": "sphere", "radius": 0.02}
 WRONG = {
     "sphere without radius": ({"type": "sphere"}, "radius must be positive"),
     "sphere of NaN": ({"type": "sphere", "radius": float("nan")}, "radius must be positive"),
-    "sphere of text": ({"type": "sphere", "radius": "wide"}, "radius must be positive"),
+    "sphere of text": ({"type": "sphere", "radius": "wide"}, "radius must be a number"),
     "sphere to the pole": ({**BALL, "v_interval": [0.0, np.pi / 2]}, "pole"),
     "sphere past the pole": ({**BALL, "v_interval": [1.0, 5.0]}, "pole"),
     "sphere more than round": ({**BALL, "u_interval": [0.0, 7.0]}, "wider than a turn"),

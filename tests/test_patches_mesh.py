@@ -131,7 +131,7 @@ WRONG = {
     "three sheets": (three_sheets, (0.005, 0.0, 0.0), {}, "no manifold"),
     "turned faces": (turned_faces, (0.0, -0.01, 0.0), {}, "no manifold"),
     "three control points": (cylinder_mesh, ROUND, {"control_points": 3}, "control_points must be"),
-    "tolerance of text": (cylinder_mesh, ROUND, {"tolerance": "small"}, "tolerance must be positive"),
+    "tolerance of text": (cylinder_mesh, ROUND, {"tolerance": "small"}, "tolerance must be a number"),
 }
 
 

@@ -17,6 +17,7 @@ from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.projection import checked_point
 from graspatlas.systems import AnySystem
+from graspatlas.tables import number_array
 
 __all__ = ["BOX_TAG", "Atlas", "Closed", "Status"]
 
@@ -29,6 +30,8 @@ BOX_TAG = -1
 ON_MANIFOLD = 1e-6
 #: How far Newton's method may come down from a point that it should lead to, as a share of the radius.
 SAME_SHEET = 0.01
+#: Coordinates of a point that is looked up are smaller, so that their squares do not overflow.
+LARGEST = 1e100
 #: Facets of a polygon shorter than this share of the radius are left out of the surface's triangulation.
 SHORT_FACET = 0.05
 
@@ -118,14 +121,15 @@ class Atlas:
             whole = name in ("facet_start", "facet_tags", "vertex_start", "vertex_closed", "neighbour_pairs")
             if array.shape != shape or array.dtype.kind not in ("iu" if whole else "f"):
                 raise GraspAtlasError(f"array '{name}' has shape {array.shape} and type {array.dtype}, not {shape}")
-            if not whole and not np.isfinite(array).all():
-                raise GraspAtlasError(f"array '{name}' holds a number that is not finite")
+            if not whole and not (np.abs(array) < LARGEST).all():
+                raise GraspAtlasError(f"array '{name}' holds a number that is not finite, or not below {LARGEST:g}")
         ends_fit = all(
-            start[0] == 0 and start[-1] == end and (np.diff(start) >= 0).all()
+            start[0] == 0 and start[-1] == end and (np.diff(start) > k).all()
             for start, end in ((self.facet_start, facets), (self.vertex_start, vertices))
         )
         pairs = self.neighbour_pairs
-        in_range = (pairs >= 0).all() and (pairs < n).all() and (self.facet_tags < n).all()
+        in_order = (pairs[:, 0] < pairs[:, 1]).all() and len(np.unique(pairs, axis=0)) == len(pairs)
+        in_range = in_order and (pairs >= 0).all() and (pairs < n).all() and (self.facet_tags < n).all()
         if n == 0 or not ends_fit or not in_range:
             raise GraspAtlasError("its charts, facets and neighbours do not fit together")
 
@@ -176,7 +180,7 @@ class Atlas:
         Returns:
             The point [configuration_size], or None when Newton's method does not converge.
         """
-        x = _core.project(self.system, self.centers[chart], self.bases[chart], np.asarray(u, float))
+        x = _core.project(self.system, self.centers[chart], self.bases[chart], number_array(u, "u"))
         return None if x is None else np.asarray(x)
 
     @cached_property

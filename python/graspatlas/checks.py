@@ -158,7 +158,7 @@ def _polytope_checks(atlas: Atlas, system: AnySystem, pairs: dict[tuple[int, int
         loose = max(loose, float(np.sort(np.abs(excess), axis=1)[:, atlas.dimension - 1].max()))
         if images[chart]:
             p = np.array(images[chart])
-            lengths = np.linalg.norm(p, axis=1)
+            lengths = np.maximum(np.linalg.norm(p, axis=1), 1e-300)
             outside = max(outside, float((vertices @ (p / lengths[:, None]).T - lengths / 2.0).max()))
     yield Check("facets that neither box, bounds nor neighbours make", float(strangers), 0.0)
     yield Check("half-spaces are off those of box, bounds and neighbours by", misplaced, HALF_SPACE_TOLERANCE)
@@ -177,7 +177,7 @@ def _half_space(
             return None
         p = basis @ (pairs[key] if chart == key[0] else -pairs[key])
         length = float(np.linalg.norm(p))
-        return p / length, length / 2.0
+        return (p / length, length / 2.0) if length > 0.0 else None
     if tag == BOX_TAG:
         axis = int(np.abs(normal).argmax())
         return np.sign(normal[axis]) * np.eye(atlas.dimension)[axis], atlas.box_half_width
@@ -186,6 +186,8 @@ def _half_space(
         return None
     p = basis @ system.bound_normals[bound]
     length = float(np.linalg.norm(p))
+    if not length > 0.0:
+        return None
     return p / length, max(float(system.slack(atlas.centers[chart])[bound]), 0.0) / length
 
 
@@ -236,7 +238,8 @@ def _result_checks(result: Result) -> Iterator[Check]:
         error = float((np.abs(again - result.qualities) / scale).max())
         yield Check("qualities differ from a new evaluation by, relatively", error, 1e-6)
     if result.feasible.any():
-        gap = float(result.qualities[result.feasible].max() - result.best.quality)
+        top, chosen = float(result.qualities[result.feasible].max()), result.best.quality
+        gap = 0.0 if top == chosen else top - chosen
         yield Check("a chart that meets the requirements is better than the best grasp by", gap, 0.0)
         winner = Grasps(problem, result.best.x, system)
         for requirement in result.requirements:

@@ -10,7 +10,7 @@ import numpy as np
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.patches import Patch, patch_from_dict
-from graspatlas.tables import checked_table, number
+from graspatlas.tables import checked_instance, checked_table, number
 
 __all__ = ["Contact"]
 
@@ -34,11 +34,16 @@ class Contact:
     hand_frozen: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for patch, frozen in ((self.object, self.frozen), (self.hand, self.hand_frozen)):
-            for name, value in frozen.items():
+        checked_instance(self.frame, str, "a contact's frame")
+        for side, patch, frozen in (
+            ("object", self.object, self.frozen),
+            ("hand", self.hand, self.hand_frozen),
+        ):
+            checked_instance(patch, Patch, f"the {side}'s side of a contact", "graspatlas.patches")
+            for name, value in checked_table(frozen, "frozen", (), None).items():
                 if name not in patch.parameters:
                     raise unknown_name("parameter", name, patch.parameters, f"one of a {patch.kind} patch's")
-                if not np.isfinite(value):
+                if not np.isfinite(number(value, f"frozen parameter '{name}'")):
                     raise GraspAtlasError(f"parameter '{name}' is frozen at {value}; it must be finite")
 
     def free(self) -> list[tuple[Patch, str]]:
@@ -65,7 +70,10 @@ class Contact:
         """
         table = checked_table(data, "a contact", ("frame", "hand", "object"), ("frozen", "hand_frozen"))
         frozen, hand_frozen = (
-            {name: number(value, f"frozen parameter '{name}'") for name, value in (table.get(key) or {}).items()}
+            {
+                name: number(value, f"frozen parameter '{name}'")
+                for name, value in checked_table(table.get(key) or {}, key, (), None).items()
+            }
             for key in ("frozen", "hand_frozen")
         )
         patches = [patch_from_dict(table[key]) for key in ("hand", "object")]

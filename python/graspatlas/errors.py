@@ -27,4 +27,5 @@ def unknown_name(kind: str, name: object, known: Iterable[str], place: str = "")
     near = near or [known_name for known_name in names if len(str(name)) > 2 and str(name) in known_name]
     where = f"not {place}" if place else "unknown"
     hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(names) or 'none'}"
-    return GraspAtlasError(f"{kind} '{name}' is {where}; {hint}")
+    shown = " ".join(str(name).split())[:80]
+    return GraspAtlasError(f"{kind} '{shown}' is {where}; {hint}")

@@ -14,11 +14,14 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand import Hand
 from graspatlas.patches import Patch
 from graspatlas.patches.touch import touching_parameters
-from graspatlas.tables import checked_table, number, numbers
+from graspatlas.tables import checked_table, number, number_array, numbers
 
 __all__ = ["FirstGrasp", "first_grasp_from_array", "first_grasp_to_array", "posture_array"]
 
 Array = NDArray[np.float64]
+
+#: Numbers of a first grasp are smaller [rad or m]: larger ones are mistakes, and their squares may overflow.
+LARGEST = 1e9
 
 
 @dataclass(frozen=True)
@@ -39,17 +42,16 @@ class FirstGrasp:
 
     def __post_init__(self) -> None:
         checked_table(self.joints, "x1's joints", (), None)
-        numbers = [
-            *self.joints.values(),
-            *self.object_xyz,
-            *self.object_quat_xyzw,
-            *(self.parameters or ()),
-        ]
-        if not np.isfinite(np.asarray(numbers, float)).all():
-            raise GraspAtlasError("x1 holds a number that is not finite")
-        if len(self.object_xyz) != 3 or len(self.object_quat_xyzw) != 4:
-            raise GraspAtlasError("x1 needs object_xyz of 3 numbers and object_quat_xyzw of 4")
-        norm = float(np.linalg.norm(self.object_quat_xyzw))
+        joints = [number(value, f"joint '{name}' of x1") for name, value in self.joints.items()]
+        xyz = number_array(self.object_xyz, "object_xyz")
+        quaternion = number_array(self.object_quat_xyzw, "object_quat_xyzw")
+        parameters = number_array(() if self.parameters is None else self.parameters, "the parameters of x1")
+        if xyz.shape != (3,) or quaternion.shape != (4,) or parameters.ndim != 1:
+            raise GraspAtlasError("x1 needs object_xyz of 3 numbers, object_quat_xyzw of 4 and a row of parameters")
+        values = np.concatenate([joints, xyz, quaternion, parameters])
+        if not (np.abs(values) < LARGEST).all():
+            raise GraspAtlasError(f"x1 holds a number that is not finite, or not below {LARGEST:g}")
+        norm = float(np.linalg.norm(quaternion))
         if norm < 1e-6:
             raise GraspAtlasError("x1 has a quaternion of length zero")
         # One that is unit to rounding stays as it came, so that a stored problem is the same problem.

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from graspatlas import _core
+from graspatlas.tables import number_array
 
 if TYPE_CHECKING:
     from graspatlas.problem import Problem
@@ -86,7 +87,7 @@ class Grasps:
     def __init__(self, problem: Problem, X: ArrayLike, system: _core.GraspSystem | None = None) -> None:
         self.problem = problem
         self.system = system if system is not None else problem.full_system
-        self.x = np.ascontiguousarray(np.atleast_2d(np.asarray(X, float)))
+        self.x = np.ascontiguousarray(np.atleast_2d(number_array(X, "X")))
 
     def __len__(self) -> int:
         return len(self.x)

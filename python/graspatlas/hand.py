@@ -161,7 +161,10 @@ class Hand(Body):
         for joint in self.limits:
             if joint not in self.joints:
                 raise unknown_name("joint", joint, self.joints, f"in hand '{self.name}'")
-            if len(self.limits[joint]) != 2 or not self.limits[joint][0] < self.limits[joint][1]:
+            if (
+                len(numbers(self.limits[joint], f"limits of joint '{joint}'")) != 2
+                or not self.limits[joint][0] < self.limits[joint][1]
+            ):
                 raise GraspAtlasError(f"limits of joint '{joint}' must be (lower, upper), got {self.limits[joint]}")
         for info in self.model.hand_joints if self.limits else ():
             if info.name in self.limits and info.q_size != 1:

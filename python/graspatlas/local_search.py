@@ -25,6 +25,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasps
 from graspatlas.quality import Quality, evaluate
 from graspatlas.requirements import Require, Requirement, screen
+from graspatlas.tables import number_array, shown
 
 if TYPE_CHECKING:
     from graspatlas.problem import Problem
@@ -47,6 +48,8 @@ MARGIN = 1e-6
 SHARES = np.array([1.0, 0.99, 0.9, 0.6, 0.3, 0.1])
 #: How far a point may be outside its bounds [units of the tangent space].
 BOUND_TOLERANCE = 1e-9
+#: Numbers of a grasp are smaller, so that their squares do not overflow.
+LARGEST = 1e100
 #: How far a start may miss its equations and be outside its bounds.
 ON_MANIFOLD = 1e-8
 #: Step of the differences, as a share of the reach.
@@ -69,6 +72,8 @@ def local_maxima(result: Result) -> IntArray:
     Returns:
         Charts [p], by decreasing quality.
     """
+    if not hasattr(result, "atlas"):
+        raise GraspAtlasError(f"result must be what graspatlas.optimize returned, got {type(result).__name__}")
     atlas, q = result.atlas, np.where(result.feasible, result.qualities, -np.inf)
     i, j = atlas.neighbour_pairs.T
     equal = q[i] == q[j]
@@ -130,6 +135,8 @@ def climb(result: Result, start: int | ArrayLike, *, all_motions: bool = False, 
         GraspAtlasError: If there is no such chart, the start is no feasible grasp or does not meet the requirements, or
             the index fails.
     """
+    if not hasattr(result, "atlas"):
+        raise GraspAtlasError(f"result must be what graspatlas.optimize returned, got {type(result).__name__}")
     if isinstance(max_steps, bool) or not isinstance(max_steps, int | np.integer) or max_steps < 1:
         raise GraspAtlasError(f"max_steps must be a whole number of at least 1, got {max_steps!r}")
     hill = _Hill.of(result, all_motions)
@@ -162,14 +169,12 @@ def _start(result: Result, start: int | ArrayLike) -> tuple[int, Array]:
     """Chart and grasp that a climb starts from; chart -1 for a grasp that was given."""
     atlas = result.atlas
     if isinstance(start, int | np.integer) and not isinstance(start, bool):
-        if not 0 <= start < atlas.n_charts:
-            raise GraspAtlasError(f"chart {start} does not exist; the atlas has charts 0 to {atlas.n_charts - 1}")
-        return int(start), atlas.centers[start]
-    x = np.asarray(start, float)
-    if x.shape != (atlas.system.configuration_size,) or not np.isfinite(x).all():
+        return int(start), result.grasp(int(start)).x
+    x = number_array(start, "a grasp to climb from")
+    if x.shape != (atlas.system.configuration_size,) or not (np.abs(x) < LARGEST).all():
         raise GraspAtlasError(
             f"a climb starts from the number of a chart or a grasp of {atlas.system.configuration_size} numbers, "
-            f"got {start!r}"
+            f"got {shown(start)}"
         )
     return -1, x
 

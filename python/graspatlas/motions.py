@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graspatlas.errors import GraspAtlasError, unknown_name
-from graspatlas.tables import checked_table, number, number_array
+from graspatlas.tables import checked_instance, checked_table, number, number_array
 
 __all__ = ["HandMotions", "coupling_rows"]
 
 Array = NDArray[np.float64]
+
+#: Joint positions are smaller [rad or m]: larger ones are mistakes, and their squares may overflow.
+LARGEST = 1e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +44,7 @@ class HandMotions:
     couplings: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
+        checked_instance(self.joints, Sequence, "joints")
         h = len(self.joints)
         mean = number_array(self.mean, "the mean of the hand motions")
         covariance = number_array(self.covariance, "the covariance of the hand motions")
@@ -49,8 +53,10 @@ class HandMotions:
                 f"hand motions of {h} joints need a mean of shape ({h},) and a covariance of shape ({h}, {h}); "
                 f"got {mean.shape} and {covariance.shape}"
             )
-        if not (np.isfinite(mean).all() and np.isfinite(covariance).all()):
-            raise GraspAtlasError("hand motions hold a number that is not finite")
+        if h == 0:
+            raise GraspAtlasError("hand motions need joints")
+        if not ((np.abs(mean) < LARGEST).all() and (np.abs(covariance) < LARGEST**2).all()):
+            raise GraspAtlasError(f"hand motions hold a number that is not finite, or not below {LARGEST:g}")
         if not np.allclose(covariance, covariance.T, atol=1e-9 * max(1.0, float(np.abs(covariance).max()))):
             raise GraspAtlasError("the covariance of the hand motions is not symmetric")
         if len(set(self.joints)) != h:
@@ -83,8 +89,11 @@ class HandMotions:
             GraspAtlasError: If the samples have another shape or hold NaN.
         """
         X = number_array(samples, "samples")
+        checked_instance(joints, Sequence, "joints")
         if X.ndim != 2 or X.shape[0] < 2 or X.shape[1] != len(joints):
             raise GraspAtlasError(f"samples must have shape (z, {len(joints)}) with z of at least 2, got {X.shape}")
+        if not (np.abs(X) < LARGEST).all():
+            raise GraspAtlasError(f"samples hold a number that is not finite, or not below {LARGEST:g}")
         return cls(tuple(joints), X.mean(axis=0), np.cov(X, rowvar=False).reshape(len(joints), -1))
 
     @classmethod
@@ -161,6 +170,7 @@ class HandMotions:
 
     def reordered(self, joints: Sequence[str]) -> HandMotions:
         """The same motions with the joints in another order."""
+        checked_instance(joints, Sequence, "joints")
         for name in joints:
             if name not in self.joints:
                 raise unknown_name("joint", name, self.joints, "one of the hand motions'")

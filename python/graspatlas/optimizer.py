@@ -25,7 +25,8 @@ from graspatlas.refinement import refine as climb_peaks
 from graspatlas.requirements import Require, screen
 from graspatlas.result import Result
 from graspatlas.search import with_first_grasp
-from graspatlas.systems import AnySystem
+from graspatlas.systems import AnySystem, check_jacobian
+from graspatlas.tables import number, number_array, shown
 
 __all__ = ["build_atlas", "optimize"]
 
@@ -103,7 +104,9 @@ def _builder(
     """A builder at x0, or where a checkpoint left off."""
     saved = folder.load() if folder else None
     if saved is None:
-        return _core.AtlasBuilder(system, x0, *options)
+        builder = _core.AtlasBuilder(system, x0, *options)
+        check_jacobian(system, builder.arrays()["centers"][0])
+        return builder
     builder = _core.AtlasBuilder.resume(system, saved, *options)
     print(f"going on from the {builder.n_charts} charts of a checkpoint", file=sys.stderr)
     return builder
@@ -227,19 +230,16 @@ def options_of(problem: Problem, chosen: dict[str, Any]) -> dict[str, Any]:
 
 
 def _numbers(name: str, value: ArrayLike) -> np.ndarray[Any, np.dtype[np.float64]]:
-    try:
-        return np.asarray(value, float)
-    except (TypeError, ValueError):
-        raise GraspAtlasError(f"{name} must be an array of numbers, got {value!r}") from None
+    return number_array(value, name)
 
 
 def _positive(name: str, value: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < float(value) < float("inf"):
-        raise GraspAtlasError(f"{name} must be a positive number, got {value!r}")
+    if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < number(value, name) < float("inf"):
+        raise GraspAtlasError(f"{name} must be a positive number, got {shown(value)}")
     return float(value)
 
 
 def _whole(name: str, value: int) -> int:
     if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < 1:
-        raise GraspAtlasError(f"{name} must be a whole number of at least 1, got {value!r}")
-    return int(value)
+        raise GraspAtlasError(f"{name} must be a whole number of at least 1, got {shown(value)}")
+    return min(int(value), _NO_LIMIT)

@@ -20,7 +20,7 @@ from graspatlas.hand import Body, Hand
 from graspatlas.motions import HandMotions
 from graspatlas.patches import Patch
 from graspatlas.requirements import Requirement, requirement_from_dict
-from graspatlas.tables import checked_table, number, number_array
+from graspatlas.tables import checked_instance, checked_table, number, number_array, shown
 
 __all__ = ["Problem"]
 
@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 #: How far a first grasp may miss a contact, since it is projected onto the contacts anyway [m], [rad].
 CONTACT_TOLERANCE = 1e-3
 NORMAL_TOLERANCE = 0.05
+#: Smallest and largest length that may count as much as one radian [m].
+LENGTH_SCALES = (1e-6, 1e6)
 #: Ways in which the object can move.
 OBJECT_JOINTS = ("free_flyer", "planar")
 #: Options of `optimize` that a problem may give.
@@ -79,12 +81,14 @@ class Problem:
     source: str = ""
 
     def __post_init__(self) -> None:
+        self._check_types()
         object.__setattr__(self, "contacts", tuple(self.contacts))
         object.__setattr__(self, "requirements", tuple(self.requirements))
         if not self.contacts:
             raise GraspAtlasError(f"problem '{self.name}' has no contact")
-        if not (np.isfinite(self.length_scale) and self.length_scale > 0.0):
-            raise GraspAtlasError(f"length_scale must be positive, got {self.length_scale}")
+        low, high = LENGTH_SCALES
+        if not low <= self.length_scale <= high:
+            raise GraspAtlasError(f"length_scale must lie between {low:g} and {high:g} m, got {self.length_scale}")
         if self.object_joint not in OBJECT_JOINTS:
             raise unknown_name("object joint", self.object_joint, OBJECT_JOINTS)
         self._check_joints()
@@ -93,6 +97,17 @@ class Problem:
         self._check_reference()
         if self.x1 is not None:
             self._check_x1(self.x1)
+
+    def _check_types(self) -> None:
+        checked_instance(self.hand, Hand, "hand", "Hand.from_urdf")
+        checked_instance(self.object, Body, "object", "Body.from_urdf")
+        checked_instance(self.contacts, (list, tuple), "contacts")
+        for contact in self.contacts:
+            checked_instance(contact, Contact, "a contact")
+        checked_instance(self.x1, (FirstGrasp, type(None)), "x1")
+        checked_instance(self.motions, (HandMotions, type(None)), "motions", "HandMotions.from_samples")
+        checked_table(self.defaults, "defaults", (), DEFAULTS)
+        number(self.length_scale, "length_scale")
 
     def _check_joints(self) -> None:
         for joint in self.hand.model.hand_joints:
@@ -209,7 +224,7 @@ class Problem:
         if isinstance(dimension, bool) or not isinstance(dimension, int | np.integer) or not 1 <= dimension <= t:
             raise GraspAtlasError(
                 f"dimension must be a whole number from 1 to {t}, the dimension of all grasps of problem "
-                f"'{self.name}'; got {dimension!r}"
+                f"'{self.name}'; got {shown(dimension)}"
             )
         s = t - int(dimension)
         if s > 0 and self.motions is None:

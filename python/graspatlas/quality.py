@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from graspatlas import _core, wrenches
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.grasps import Grasp, Grasps
+from graspatlas.tables import number
 from graspatlas.wrenches import checked_positive
 
 __all__ = [
@@ -65,7 +66,7 @@ def _axes(grasps: Grasps, length_unit: float) -> Array:
 
     What is usual is the largest connectivity of x1, if there is one, and of the grasps at hand.
     """
-    if not (np.isfinite(length_unit) and length_unit > 0.0):
+    if not 0.0 < number(length_unit, "length_unit") < np.inf:
         raise GraspAtlasError(f"length_unit must be positive, got {length_unit}")
     x1 = [] if grasps.problem.x1 is None else [grasps.problem.x1_array]
     axes = np.asarray(_core.semi_axes(grasps.system, np.vstack([*x1, grasps.x]), length_unit))

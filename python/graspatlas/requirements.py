@@ -18,7 +18,7 @@ from graspatlas import _core
 from graspatlas.collision import CollisionChecker
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.grasps import Grasps
-from graspatlas.tables import checked_table
+from graspatlas.tables import checked_instance, checked_table, shown
 
 if TYPE_CHECKING:
     from graspatlas.problem import Problem
@@ -44,6 +44,9 @@ Slacks = Callable[[Grasps], Array]
 NEAREST_PAIRS = 12
 #: What optimisers keep beyond the clearance: distances of touching shapes have no slope [m].
 CLOSEST = 1e-5
+
+#: Values of a requirement are at most this.
+LARGEST = 1e9
 
 
 @dataclass(frozen=True)
@@ -83,10 +86,10 @@ class Requirement:
     def _check(self, positive: Sequence[str], finite: Sequence[str] = ()) -> None:
         for attribute in (*positive, *finite):
             value = getattr(self, attribute)
-            low = 0.0 if attribute in positive else -np.inf
-            if isinstance(value, bool) or not isinstance(value, int | float) or not low < value < np.inf:
+            low = 0.0 if attribute in positive else -LARGEST
+            if isinstance(value, bool) or not isinstance(value, int | float) or not low < value <= LARGEST:
                 kind = "positive" if attribute in positive else "finite"
-                raise GraspAtlasError(f"{attribute} of requirement {self.name} must be {kind}, got {value!r}")
+                raise GraspAtlasError(f"{attribute} of requirement {self.name} must be {kind}, got {shown(value)}")
 
 
 @dataclass(frozen=True)
@@ -217,14 +220,14 @@ def parse_requirement(text: str) -> Requirement:
         raise unknown_name("requirement", name, REQUIREMENTS)
     attributes = [field.name for field in fields(REQUIREMENTS[name])]
     if len(values) > len(attributes):
-        raise GraspAtlasError(f"requirement {name} has the values {', '.join(attributes)}; got '{text}'")
+        raise GraspAtlasError(f"requirement {name} has the values {', '.join(attributes)}; got {shown(text)}")
     try:
         return REQUIREMENTS[name](*map(float, values))
     except ValueError as error:
         if isinstance(error, GraspAtlasError):
             raise
         raise GraspAtlasError(
-            f"requirement '{text}' holds a value that is no number; it is {name}:{':'.join(attributes)}"
+            f"requirement {shown(text)} holds a value that is no number; it is {name}:{':'.join(attributes)}"
         ) from None
 
 
@@ -259,6 +262,13 @@ def screen(requirements: Sequence[Require], grasps: Grasps) -> tuple[Flags, dict
     Raises:
         GraspAtlasError: If a predicate raises or returns the wrong shape.
     """
+    checked_instance(requirements, (list, tuple), "require")
+    for requirement in requirements:
+        if not isinstance(requirement, Requirement) and not callable(requirement):
+            raise GraspAtlasError(
+                f"a requirement is one of {', '.join(REQUIREMENTS)} or a function of a grasp, not "
+                f"{shown(requirement)}; requirements.parse_requirement reads text"
+            )
     left = np.arange(len(grasps))
     refused: dict[str, int] = {}
     for requirement in sorted(requirements, key=lambda r: r.cost if isinstance(r, Requirement) else 1):

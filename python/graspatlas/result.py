@@ -169,8 +169,11 @@ class Result:
         Raises:
             GraspAtlasError: If there is no such chart.
         """
-        if not 0 <= chart < self.atlas.n_charts:
-            raise GraspAtlasError(f"chart {chart} does not exist; the atlas has charts 0 to {self.atlas.n_charts - 1}")
+        whole = isinstance(chart, int | np.integer) and not isinstance(chart, bool)
+        if not whole or not 0 <= chart < self.atlas.n_charts:
+            raise GraspAtlasError(
+                f"chart {chart!r} does not exist; the atlas has charts 0 to {self.atlas.n_charts - 1}"
+            )
         one = Grasps(self.problem, self.atlas.centers[chart])[0]
         return replace(one, quality=float(self.qualities[chart]), chart=chart)
 

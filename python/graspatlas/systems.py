@@ -20,10 +20,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from graspatlas._core import Angles, AnySystem, PythonSystem, Rotations, Sphere, Torus
 from graspatlas.errors import GraspAtlasError
+from graspatlas.tables import number_array
 
-__all__ = ["Angles", "AnySystem", "Rotations", "Sphere", "System", "Torus", "jacobian_error"]
+__all__ = ["Angles", "AnySystem", "Rotations", "Sphere", "System", "Torus", "check_jacobian", "jacobian_error"]
 
 Array = NDArray[np.float64]
+
+#: Variables that a system may have: its Jacobians are dense.
+MOST_VARIABLES = 10_000
+#: Steps of the differences that a Jacobian is compared with, and how far it may be off, relative to its largest entry.
+DIFFERENCE_STEPS = (1e-6, 1e-5, 1e-4, 1e-7)
+JACOBIAN_TOLERANCE = 1e-3
 
 
 class System(PythonSystem):
@@ -48,9 +55,12 @@ class System(PythonSystem):
         lower: ArrayLike = -np.inf,
         upper: ArrayLike = np.inf,
     ) -> None:
+        for name, count in (("n_variables", n_variables), ("n_equations", n_equations)):
+            if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 0 <= count <= MOST_VARIABLES:
+                raise GraspAtlasError(f"{name} must be a whole number from 0 to {MOST_VARIABLES}, got {count!r}")
         try:
-            low = np.broadcast_to(np.asarray(lower, float), (n_variables,))
-            high = np.broadcast_to(np.asarray(upper, float), (n_variables,))
+            low = np.broadcast_to(number_array(lower, "lower"), (n_variables,))
+            high = np.broadcast_to(number_array(upper, "upper"), (n_variables,))
         except ValueError as error:
             raise GraspAtlasError(f"bounds need one number, or {n_variables}: {error}") from None
         super().__init__(n_variables, n_equations, low, high)
@@ -85,3 +95,32 @@ def jacobian_error(system: AnySystem, x: ArrayLike, step: float = 1e-6) -> float
         columns.append((ahead - behind) / (2.0 * step))
     difference = np.array(columns).T - system.evaluate_jacobian(point)
     return float(np.abs(difference).max(initial=0.0))
+
+
+def check_jacobian(system: AnySystem, x: ArrayLike) -> None:
+    """Make sure that the Jacobian of a system written in Python is the derivative of its residual at a point.
+
+    Newton's method forgives a wrong Jacobian, and would find a manifold's points with wrong tangent spaces. Differences
+    of several lengths are tried, so that an equation may be steep or rough; where none is finite nothing is said.
+
+    Args:
+        system: Any system; compiled ones are not asked.
+        x: A point [configuration_size].
+
+    Raises:
+        GraspAtlasError: If all differences say that the Jacobian is another one.
+    """
+    if not isinstance(system, System):
+        return
+    size = float(np.abs(system.evaluate_jacobian(x)).max(initial=0.0))
+    smallest = np.inf
+    for step in DIFFERENCE_STEPS:
+        error = jacobian_error(system, x, step)
+        if not error > JACOBIAN_TOLERANCE * size:
+            return
+        smallest = min(smallest, error)
+    raise GraspAtlasError(
+        f"jacobian(x) of {type(system).__name__} is not the derivative of residual(x) at the first point: differences "
+        f"of the residual are off by {smallest:.2g}, its largest entry is {size:.2g}; correct it, "
+        "graspatlas.systems.jacobian_error measures it"
+    )

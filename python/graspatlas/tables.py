@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,31 @@ from numpy.typing import ArrayLike, NDArray
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 
-__all__ = ["checked_table", "number", "number_array", "numbers"]
+__all__ = ["checked_instance", "checked_table", "number", "number_array", "numbers", "shown"]
+
+
+def checked_instance(value: Any, kind: type | tuple[type, ...], what: str, hint: str = "") -> None:
+    """Make sure that a value is of a type.
+
+    Args:
+        value: What came.
+        kind: The type or types that it may have.
+        what: Its name for the message.
+        hint: What makes one, for the message.
+
+    Raises:
+        GraspAtlasError: If it is of another.
+    """
+    if not isinstance(value, kind):
+        kinds = kind if isinstance(kind, tuple) else (kind,)
+        expected = " or ".join(k.__name__ for k in kinds)
+        raise GraspAtlasError(f"{what} must be a {expected}, got {shown(value)}{hint and f'; see {hint}'}")
+
+
+def shown(value: Any) -> str:
+    """A value for a message: text and numbers as they are, of large things the type."""
+    text = repr(value)
+    return text if len(text) <= 60 and "\n" not in text else f"a {type(value).__name__}"
 
 
 def checked_table(
@@ -28,7 +53,7 @@ def checked_table(
         GraspAtlasError: If it is no table, lacks a key, or has an unknown one.
     """
     if not isinstance(data, Mapping):
-        raise GraspAtlasError(f"{what} must be a table, got {data!r}")
+        raise GraspAtlasError(f"{what} must be a table, got {shown(data)}")
     for key in required:
         if key not in data:
             raise GraspAtlasError(f"{what} has no '{key}'")
@@ -45,9 +70,12 @@ def number(value: Any, what: str) -> float:
     Raises:
         GraspAtlasError: If it is none.
     """
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise GraspAtlasError(f"{what} must be a number, got {value!r}")
-    return float(value)
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise GraspAtlasError(f"{what} must be a number, got {shown(value)}")
+    try:
+        return float(value)
+    except OverflowError:
+        raise GraspAtlasError(f"{what} is too large a whole number") from None
 
 
 def numbers(value: Any, what: str) -> tuple[float, ...]:
@@ -57,7 +85,7 @@ def numbers(value: Any, what: str) -> tuple[float, ...]:
         GraspAtlasError: If it is none.
     """
     if isinstance(value, str) or not isinstance(value, Sequence):
-        raise GraspAtlasError(f"{what} must be a list of numbers, got {value!r}")
+        raise GraspAtlasError(f"{what} must be a list of numbers, got {shown(value)}")
     return tuple(number(item, what) for item in value)
 
 
@@ -69,5 +97,5 @@ def number_array(value: ArrayLike, what: str) -> NDArray[np.float64]:
     """
     try:
         return np.asarray(value, float)
-    except (TypeError, ValueError):
-        raise GraspAtlasError(f"{what} must be an array of numbers, got {value!r}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise GraspAtlasError(f"{what} must be an array of numbers, got {shown(value)}") from None

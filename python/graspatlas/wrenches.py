@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
-from graspatlas.tables import number_array
+from graspatlas.tables import number, number_array
 
 __all__ = ["ball_radius", "contact_axes", "contact_wrenches", "hull_volume", "min_weight", "round_ball_radius"]
 
@@ -33,7 +33,7 @@ def checked_positive(value: float, what: str) -> float:
     Raises:
         GraspAtlasError: If it is none.
     """
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0.0 < float(value) < np.inf:
+    if not 0.0 < number(value, what) < np.inf:
         raise GraspAtlasError(f"{what} must be a positive number, got {value!r}")
     return float(value)
 

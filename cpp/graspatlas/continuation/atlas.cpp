@@ -20,9 +20,14 @@ constexpr int kLooks = 100;
 constexpr int kSmall = 64;
 // In the order of a large one, a chart is far from so many before it, if one of so many to come is.
 constexpr int kFarFrom = 7, kChoices = 24;
+// Beside smaller charts rounding and the tolerances of points and polytopes are no longer small.
+constexpr double kSmallestRadius = 1e-7;
 
 void check_options(const AtlasOptions& options, const System& system) {
   if (!(options.radius > 0.0)) throw Error("radius must be positive, got " + to_text(options.radius));
+  if (!(options.radius >= kSmallestRadius))
+    throw Error("radius must be at least " + to_text(kSmallestRadius) + ", got " + to_text(options.radius) +
+                "; scale the variables of a smaller manifold");
   if (!(options.radius < system.radius_limit()))
     throw Error("radius must be below " + to_text(system.radius_limit()) + " for this system, got " +
                 to_text(options.radius));

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
-from graspatlas.tables import number_array
+from graspatlas.tables import number, number_array
 
 __all__ = ["AxialPatch", "FlippablePatch", "Patch"]
 
@@ -20,13 +19,15 @@ Array = NDArray[np.float64]
 Vector3 = tuple[float, float, float]
 Interval = tuple[float, float]
 EVERYWHERE: Interval = (-np.inf, np.inf)
+#: Lengths of a patch are smaller [m]: larger ones are mistakes, and their squares may overflow.
+LARGEST = 1e9
 
 
 def checked_vector(value: ArrayLike, what: str, *, unit: bool = False) -> Vector3:
     """Three finite numbers; normalised if a unit vector is asked for."""
     array = number_array(value, what)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise GraspAtlasError(f"{what} must be three finite numbers, got {value!r}")
+    if array.shape != (3,) or not (np.abs(array) < LARGEST).all():
+        raise GraspAtlasError(f"{what} must be three finite numbers below {LARGEST:g}, got {value!r}")
     if unit:
         length = float(np.linalg.norm(array))
         if length < 1e-9:
@@ -54,16 +55,16 @@ def checked_angles(value: Sequence[float], what: str) -> Interval:
 
 def checked_length(value: Any, what: str) -> float:
     """A positive finite number."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < float(value) < np.inf:
-        raise GraspAtlasError(f"{what} must be positive, got {value!r}")
+    if not 0.0 < number(value, what) < LARGEST:
+        raise GraspAtlasError(f"{what} must be positive and below {LARGEST:g}, got {value!r}")
     return float(value)
 
 
 def checked_pair(value: Sequence[float], what: str) -> tuple[float, float]:
     """Two finite numbers."""
     array = number_array(value, what)
-    if array.shape != (2,) or not np.isfinite(array).all():
-        raise GraspAtlasError(f"{what} must be two finite numbers, got {value!r}")
+    if array.shape != (2,) or not (np.abs(array) < LARGEST).all():
+        raise GraspAtlasError(f"{what} must be two finite numbers below {LARGEST:g}, got {value!r}")
     return (float(array[0]), float(array[1]))
 
 

@@ -13,6 +13,7 @@ from graspatlas.patches.flat import Plane, Point
 from graspatlas.patches.round import Ellipsoid, Sphere, Torus
 from graspatlas.patches.spline import Bezier, BSpline
 from graspatlas.patches.turned import Cone, Cylinder, Revolution
+from graspatlas.tables import shown
 
 __all__ = ["patch_from_dict", "patch_types"]
 
@@ -36,7 +37,7 @@ def patch_from_dict(data: Mapping[str, Any]) -> Patch:
         GraspAtlasError: For an unknown type or attribute, or values that make no patch.
     """
     if not isinstance(data, Mapping):
-        raise GraspAtlasError(f"a patch is a table with a 'type', got {data!r}")
+        raise GraspAtlasError(f"a patch is a table with a 'type', got {shown(data)}")
     values = dict(data)
     kind = values.pop("type", None)
     if kind not in _KINDS:
@@ -53,4 +54,4 @@ def patch_from_dict(data: Mapping[str, Any]) -> Patch:
     except GraspAtlasError as error:
         raise GraspAtlasError(f"{kind} patch: {error}") from None
     except TypeError as error:
-        raise GraspAtlasError(f"a {kind} patch cannot be made of {values}: {error}") from None
+        raise GraspAtlasError(f"a {kind} patch cannot be made of {shown(values)}: {error}") from None

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
-from graspatlas.patches.base import Array, FlippablePatch, Interval, Vector3, checked_interval
+from graspatlas.patches.base import LARGEST, Array, FlippablePatch, Interval, Vector3, checked_interval
 from graspatlas.patches.nearest import nearest_parameters
 from graspatlas.tables import number_array
 
@@ -41,7 +41,7 @@ class _TensorProduct(FlippablePatch):
     def __post_init__(self) -> None:
         super().__post_init__()
         points = number_array(self.control_points, "control_points")
-        if points.ndim != 3 or points.shape[2] != 3 or min(points.shape) < 2 or not np.isfinite(points).all():
+        if points.ndim != 3 or points.shape[2] != 3 or min(points.shape) < 2 or not (np.abs(points) < LARGEST).all():
             raise GraspAtlasError(
                 "control_points must be finite numbers of shape [p, q, 3] with p and q at least 2, got shape "
                 f"{list(points.shape)}{'' if np.isfinite(points).all() else ' with numbers that are not finite'}"

@@ -13,6 +13,7 @@ from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.patches.base import (
     EVERYWHERE,
+    LARGEST,
     Array,
     AxialPatch,
     Interval,
@@ -24,6 +25,9 @@ from graspatlas.tables import number_array
 
 __all__ = ["Cone", "Cylinder", "Revolution"]
 
+#: Heights of an outline are farther apart [m], or its slope would be no number.
+CLOSEST = 1e-9
+
 
 @dataclass(frozen=True)
 class TurnedPatch(AxialPatch):
@@ -31,7 +35,7 @@ class TurnedPatch(AxialPatch):
 
     def _check_radius(self) -> None:
         """The radius must not be negative anywhere in the interval of v, past an apex or between points."""
-        low, high = self.v_interval or self.default_v_interval()
+        low, high = np.clip(self.v_interval or self.default_v_interval(), -LARGEST, LARGEST)
         if not (self.radius_at(np.linspace(low, high, 1001)) >= 0.0).all():
             raise GraspAtlasError(f"the radius is negative in v_interval ({low:g}, {high:g}): end it before the apex")
 
@@ -125,8 +129,8 @@ class Cone(TurnedPatch):
         object.__setattr__(self, "heights", checked_pair(self.heights, "heights"))
         object.__setattr__(self, "radii", checked_pair(self.radii, "radii"))
         (h0, h1), (r0, r1) = self.heights, self.radii
-        if h0 == h1:
-            raise GraspAtlasError(f"a cone needs two different heights, got {self.heights}")
+        if not abs(h1 - h0) > CLOSEST:
+            raise GraspAtlasError(f"a cone needs two heights more than {CLOSEST:g} m apart, got {self.heights}")
         if min(r0, r1) < 0.0 or max(r0, r1) <= 0.0:
             raise GraspAtlasError(f"a cone needs radii that are not negative, got {self.radii}")
         self._check_radius()
@@ -157,8 +161,11 @@ class Revolution(TurnedPatch):
         object.__setattr__(self, "radii", tuple(map(float, number_array(self.radii, "radii").ravel())))
         if len(self.heights) < 2 or len(self.heights) != len(self.radii):
             raise GraspAtlasError("an outline needs at least two heights and as many radii")
-        if not (np.diff(self.heights) > 0.0).all() or not (np.array(self.radii) > 0.0).all():
-            raise GraspAtlasError("an outline needs ascending heights and positive radii")
+        radii = np.array(self.radii)
+        if not (np.abs(self.heights) < LARGEST).all() or not (np.diff(self.heights) > CLOSEST).all():
+            raise GraspAtlasError(f"an outline needs ascending heights, finite and more than {CLOSEST:g} m apart")
+        if not ((radii > 0.0) & (radii < LARGEST)).all():
+            raise GraspAtlasError(f"an outline needs positive radii below {LARGEST:g}")
         self._check_radius()
 
     def outline(self) -> tuple[Array, Array]:

@@ -23,6 +23,8 @@ FloatArray = NDArray[np.float32]
 
 #: Smallest picture [pixels].
 MIN_WIDTH, MIN_HEIGHT = 320, 180
+#: Largest side of a picture [pixels]: each takes a kilobyte while it is drawn.
+MAX_SIDE = 8192
 #: Each pixel is the mean of this many by this many.
 SAMPLES = 2
 #: The background is computed for one in so many samples each way.
@@ -41,8 +43,12 @@ def check_size(width: int, height: int) -> None:
     Raises:
         GraspAtlasError: If it has not.
     """
-    if width < MIN_WIDTH or height < MIN_HEIGHT:
-        raise GraspAtlasError(f"a picture needs at least {MIN_WIDTH} by {MIN_HEIGHT} pixels, got {width} by {height}")
+    whole = all(isinstance(side, int) and not isinstance(side, bool) for side in (width, height))
+    if not whole or width < MIN_WIDTH or height < MIN_HEIGHT or max(width, height) > MAX_SIDE:
+        raise GraspAtlasError(
+            f"a picture needs at least {MIN_WIDTH} by {MIN_HEIGHT} pixels and at most {MAX_SIDE} a side, "
+            f"got {width!r} by {height!r}"
+        )
 
 
 def draw(scene: Scene, width: int, height: int) -> Image.Image:

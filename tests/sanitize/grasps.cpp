@@ -1,0 +1,218 @@
+#include <Eigen/Geometry>
+#include <Eigen/QR>
+#include <array>
+#include <limits>
+
+#include "graspatlas/continuation/atlas.hpp"
+#include "graspatlas/grasp/grasp_system.hpp"
+#include "graspatlas/quality/force_closure.hpp"
+#include "graspatlas/quality/manipulability.hpp"
+#include "strain.hpp"
+
+namespace strain {
+
+namespace {
+
+using namespace graspatlas;
+
+constexpr std::array<double, 9> kBent = {0.1, -0.6, -0.5, 2.0, -0.7, -0.6, -2.1, -0.8, -0.4};
+
+// Three fingers of three joints each round a palm.
+std::string hand_urdf(const std::string& kind) {
+  const char* roots[] = {"0.06 0 0", "-0.03 0.05 0", "-0.03 -0.05 0"};
+  const char* axes[] = {"0 0 1", "0 1 0", "0.3 1 0.2"};
+  std::string text = "<robot name='tripod'><link name='palm'/>";
+  for (int finger = 0; finger < 3; ++finger) {
+    std::string parent = "palm", xyz = roots[finger];
+    for (int joint = 0; joint < 4; ++joint) {
+      const std::string name = std::string(1, static_cast<char>('a' + finger)) + std::to_string(joint);
+      text += "<link name='l" + name + "'/><joint name='" + name + "' type='" + (joint == 3 ? "fixed" : kind) +
+              "'><origin xyz='" + xyz + "'/><parent link='" + parent + "'/><child link='l" + name + "'/>";
+      if (joint < 3) text += std::string("<axis xyz='") + axes[joint] + "'/>";
+      text += "<limit lower='-3' upper='3' effort='1' velocity='1'/></joint>";
+      parent = "l" + name;
+      xyz = "0.05 0 0";
+    }
+  }
+  return text + "</robot>";
+}
+
+// The patch, and its placement on the object, such that at (u, v) it touches a point with its normal.
+template <class Make>
+ContactSide side_on_object(int joint, const Eigen::Vector3d& point, const Eigen::Vector3d& normal, double u, double v,
+                           Make make) {
+  PatchPoint local;
+  make(Placement{})->evaluate(u, v, local);
+  Eigen::Matrix3d from, to;
+  from << local.m, local.a, local.m.cross(local.a);
+  const Eigen::Vector3d tangent = normal.unitOrthogonal();
+  to << normal, tangent, normal.cross(tangent);
+  Placement placement;
+  placement.rotation = to * from.transpose();
+  placement.translation = point - placement.rotation * local.o;
+  return {joint, {}, make(placement), {true, u, false, u - 1.0, u + 1.0}, {true, v, false, v - 0.02, v + 0.02}};
+}
+
+struct Tripod {
+  std::shared_ptr<GraspSystem> system;
+  std::vector<double> x1;
+};
+
+// A grasp of the tripod with `kept` hand motions: one fingertip on a plane, two on surfaces of revolution.
+Tripod tripod(int kept, double length_scale) {
+  auto model = std::make_shared<Model>(hand_urdf("revolute"), ObjectJoint::free_flyer);
+  std::vector<double> x1(kBent.begin(), kBent.end());
+  x1.insert(x1.end(), {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0});
+  model->update(x1.data(), false);
+  std::vector<Contact> contacts;
+  for (const FrameInfo& frame : model->hand_frames()) {
+    if (frame.name.back() != '3') continue;
+    const Placement& joint = model->placement(frame.joint);
+    const Eigen::Vector3d point = joint.rotation * frame.placement.translation + joint.translation;
+    const Eigen::Vector3d normal(0.0, 0.0, 1.0);
+    Placement tip;
+    tip.rotation.col(1) = joint.rotation.transpose() * normal;
+    tip.rotation.col(0) = tip.rotation.col(1).unitOrthogonal();
+    tip.rotation.col(2) = tip.rotation.col(0).cross(tip.rotation.col(1));
+    tip.translation = frame.placement.translation;
+    const ContactSide hand = {frame.joint, tip, std::make_shared<PlanePatch>(Placement{}), {}, {}};
+    const int object = model->object_joint();
+    const auto plane = [](const Placement& at) { return std::make_shared<PlanePatch>(at); };
+    const auto turned = [&](const Placement& at) {
+      Eigen::Matrix<double, Eigen::Dynamic, 4> outline(2, 4);
+      outline << 0.03, 0.1, 0.0, 0.0, 0.031, 0.1, -1.0, 0.0;
+      return std::make_shared<RevolutionPatch>(at, std::vector<double>{0.0, 0.01, 0.03}, outline);
+    };
+    if (contacts.empty())
+      contacts.push_back({hand, side_on_object(object, point, -normal, 0.0, 0.0, plane)});
+    else
+      contacts.push_back({hand, side_on_object(object, point, -normal, 0.3, 0.012, turned)});
+    for (const PatchParameter* w : {&contacts.back().object.u, &contacts.back().object.v}) x1.push_back(w->value);
+  }
+  Random random(11);
+  Matrix motions(9, 9);
+  for (Eigen::Index i = 0; i < motions.size(); ++i) motions(i) = random.normal();
+  motions = Eigen::HouseholderQR<Matrix>(motions).householderQ() * Matrix::Identity(9, kept);
+  if (kept == 9) motions.setIdentity();
+  const auto lower = model->lower_limits(), upper = model->upper_limits();
+  return {std::make_shared<GraspSystem>(model, contacts, motions, length_scale, lower, upper), x1};
+}
+
+// Central differences of the residual against the Jacobian.
+void check_jacobian(GraspSystem& system, const double* x) {
+  const int n = system.tangent_size(), e = system.equation_count();
+  std::vector<double> R(e), J(static_cast<std::size_t>(e) * n), ahead(e), behind(e), v(n),
+      moved(system.configuration_size());
+  system.linearize(x, R.data(), J.data());
+  const double step = 1e-6;
+  for (int c = 0; c < n; ++c) {
+    std::fill(v.begin(), v.end(), 0.0);
+    v[c] = step;
+    system.integrate(x, v.data(), moved.data());
+    system.residual(moved.data(), ahead.data());
+    v[c] = -step;
+    system.integrate(x, v.data(), moved.data());
+    system.residual(moved.data(), behind.data());
+    for (int i = 0; i < e; ++i)
+      require(std::abs((ahead[i] - behind[i]) / (2.0 * step) - J[static_cast<std::size_t>(i) * n + c]) < 1e-4,
+              "the Jacobian is the derivative of the residual");
+  }
+}
+
+void trace(int kept, double radius, std::int64_t limit) {
+  const Tripod made = tripod(kept, 0.01);
+  GraspSystem& system = *made.system;
+  check_jacobian(system, made.x1.data());
+  AtlasOptions options;
+  options.radius = radius;
+  options.epsilon = 0.5;
+  Atlas atlas(system, made.x1.data(), options);
+  atlas.expand(limit, 5.0);
+  require(atlas.count() > 10, "the atlas of a made-up grasp grows");
+  Manipulability manipulability(system, 1e-3);
+  ForceClosure closure(system, 0.5);
+  std::vector<double> axes(system.object_dof()), R(system.equation_count());
+  for (std::int64_t i = 0; i < atlas.count(); ++i) {
+    system.residual(atlas.center(i), R.data());
+    for (double r : R) require(std::abs(r) < 1e-9, "centres fulfil the contacts");
+    manipulability.semi_axes(atlas.center(i), axes.data());
+    for (double axis : axes) require(std::isfinite(axis) && axis >= 0.0, "semi-axes are numbers");
+    const double margin = closure.margin(atlas.center(i));
+    require(std::isfinite(margin) && margin >= 0.0, "margins are numbers");
+  }
+}
+
+// Patches far outside their outline, on the axis and with absurd numbers give numbers, or none, but no fault.
+void strange_patches() {
+  Random random(3);
+  Eigen::Matrix<double, Eigen::Dynamic, 4> cone(1, 4);
+  cone << 0.0, 1.0, 0.0, 0.0;  // the apex is at v = 0
+  const RevolutionPatch apex(Placement{}, {0.0, 1.0}, cone);
+  Eigen::Matrix<double, Eigen::Dynamic, 4> wavy(3, 4);
+  wavy << 1.0, 0.0, -1.0, 0.5, 1.0, 2.0, 0.0, -3.0, 0.5, -1.0, 4.0, 0.0;
+  const RevolutionPatch pieces(Placement{}, {-1.0, 0.0, 0.5, 2.0}, wavy);
+  const PlanePatch plane{Placement{}};
+  PatchPoint p;
+  const double huge = std::numeric_limits<double>::max(), infinity = std::numeric_limits<double>::infinity();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const Patch* patch :
+       {static_cast<const Patch*>(&apex), static_cast<const Patch*>(&pieces), static_cast<const Patch*>(&plane)}) {
+    for (int i = 0; i < 2000; ++i) patch->evaluate(random.uniform(-10, 10), random.uniform(-3, 3), p);
+    for (double u : {0.0, 1e-310, huge, -huge, infinity, nan})
+      for (double v : {0.0, -1.0, 0.5, 2.0, 1e-310, huge, -huge, infinity, nan}) patch->evaluate(u, v, p);
+  }
+  using Outline = Eigen::Matrix<double, Eigen::Dynamic, 4>;
+  refuse([] { RevolutionPatch({}, {0.0, 1.0}, Outline(0, 4)); }, "pieces");
+  refuse([] { RevolutionPatch({}, {0.0}, Outline::Zero(1, 4)); }, "breaks");
+  refuse([] { RevolutionPatch({}, {1.0, 0.0}, Outline::Zero(1, 4)); }, "ascend");
+  refuse([] { RevolutionPatch({}, {0.0, std::nan("")}, Outline::Zero(1, 4)); }, "ascend");
+}
+
+void wrong_systems() {
+  for (const char* urdf : {"", "<", "<robot", "<robot name='r'/>", "<robot name='r'><link name='a'/></robot>"})
+    refuse([&] { Model(urdf, ObjectJoint::none); }, "URDF");
+  for (const char* kind : {"floating", "planar"}) Model(hand_urdf(kind), ObjectJoint::planar);
+  auto model = std::make_shared<Model>(hand_urdf("revolute"), ObjectJoint::free_flyer);
+  const auto lower = model->lower_limits(), upper = model->upper_limits();
+  const Matrix all = Matrix::Identity(9, 9);
+  refuse([&] { GraspSystem(model, {}, Matrix::Identity(8, 8), 0.01, lower, upper); }, "rows");
+  refuse([&] { GraspSystem(model, {}, all, 0.0, lower, upper); }, "length_scale");
+  refuse([&] { GraspSystem(model, {}, all, 0.01, {0.0}, upper); }, "limits");
+  refuse([&] { GraspSystem(model, {}, all, 0.01, upper, lower); }, "limits");
+  const ContactSide nowhere = {99, {}, std::make_shared<PlanePatch>(Placement{}), {}, {}};
+  refuse([&] { GraspSystem(model, {{nowhere, nowhere}}, all, 0.01, lower, upper); }, "joint 99");
+  GraspSystem free(model, {}, all, 0.01, lower, upper);
+  refuse([&] { Manipulability(free, 1e-3); }, "contact");
+  refuse([&] { ForceClosure(free, 0.5); }, "contact");
+  const Tripod made = tripod(9, 0.01);
+  refuse([&] { Manipulability(*made.system, 0.0); }, "length_unit");
+  refuse([&] { ForceClosure(*made.system, -1.0); }, "friction");
+}
+
+// Grasps that no manifold has: qualities of arbitrary postures, contacts that miss, all fingers straight.
+void arbitrary_grasps() {
+  const Tripod made = tripod(9, 0.01);
+  Manipulability manipulability(*made.system, 1e-3);
+  std::vector<double> axes(made.system->object_dof());
+  Random random(5);
+  for (int i = 0; i < 200; ++i) {
+    std::vector<double> x = made.x1;
+    const double size = std::pow(10.0, random.uniform(-3.0, 3.0));
+    for (int c = 0; c < 12; ++c) x[c] = i == 0 ? 0.0 : x[c] + size * random.normal();
+    manipulability.semi_axes(x.data(), axes.data());
+    ForceClosure(*made.system, std::pow(10.0, random.uniform(-6.0, 6.0))).margin(x.data());
+  }
+}
+
+}  // namespace
+
+void grasps() {
+  strange_patches();
+  wrong_systems();
+  trace(5, 0.2, 200);
+  trace(4, 0.3, 100);
+  trace(9, 0.5, 30);
+  arbitrary_grasps();
+}
+
+}  // namespace strain

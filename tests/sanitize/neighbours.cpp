@@ -1,0 +1,78 @@
+#include "graspatlas/continuation/neighbours.hpp"
+
+#include "strain.hpp"
+
+namespace strain {
+
+namespace {
+
+using Point = std::vector<double>;
+
+std::vector<int> by_comparing_all(const std::vector<Point>& points, const Point& from, double distance) {
+  std::vector<int> out;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    double squared = 0.0;
+    for (std::size_t c = 0; c < from.size(); ++c) squared += (points[i][c] - from[c]) * (points[i][c] - from[c]);
+    if (squared <= distance * distance) out.push_back(static_cast<int>(i));
+  }
+  return out;
+}
+
+// Inserts points one by one and asks about points there and elsewhere on the way.
+void compare(int size, int count, unsigned seed, Point (*next)(Random&, int, int)) {
+  Random random(seed);
+  graspatlas::Neighbours tree(size);
+  std::vector<Point> points;
+  std::vector<int> found;
+  const Point origin(size, 0.0);
+  tree.within(origin.data(), 1.0, found);
+  require(found.empty(), "an empty tree finds nothing");
+  for (int i = 0; i < count; ++i) {
+    points.push_back(next(random, size, i));
+    tree.insert(points.back().data());
+    if (random.below(20)) continue;
+    const Point& from = points[random.below(i + 1)];
+    const double distances[] = {0.0, 1e-9, 0.1, 1.0, 1e200};
+    for (double distance : distances) {
+      tree.within(from.data(), distance, found);
+      require(found == by_comparing_all(points, from, distance), "the tree finds what comparing all finds");
+    }
+  }
+  require(tree.count() == count, "the tree counts its points");
+}
+
+Point anywhere(Random& random, int size, int) {
+  Point p(size);
+  for (double& c : p) c = random.uniform(-1.0, 1.0);
+  return p;
+}
+
+Point on_a_line(Random&, int size, int i) { return Point(size, 0.01 * i); }
+
+Point one_place(Random&, int size, int) { return Point(size, 0.25); }
+
+Point two_places_and_neighbours(Random& random, int size, int i) {
+  Point p(size, i % 2 ? 0.5 : -0.5);
+  p[random.below(size)] += random.uniform(-1e-15, 1e-15);
+  return p;
+}
+
+Point far_apart(Random& random, int size, int i) {
+  Point p = anywhere(random, size, i);
+  p[0] *= std::pow(10.0, random.uniform(-150.0, 150.0));
+  return p;
+}
+
+}  // namespace
+
+void neighbours() {
+  for (int size : {1, 2, 3, 9, 24}) {
+    compare(size, 1500, 1, anywhere);
+    compare(size, 600, 2, on_a_line);
+    compare(size, 600, 3, one_place);
+    compare(size, 600, 4, two_places_and_neighbours);
+    compare(size, 600, 5, far_apart);
+  }
+}
+
+}  // namespace strain
