@@ -21,7 +21,7 @@ def grasp_case(name, dimension, radius):
 
 
 CASES = {
-    "sphere": lambda: (Sphere(3), [0.0, 0.0, 1.0], SPHERE),
+    "sphere": lambda: (Sphere(3), [0.0, 0.0, 1.0], {"radius": 0.03, "epsilon": 0.1}),
     "3-sphere": lambda: (Sphere(4), [0.0, 0.0, 0.0, 1.0], {"radius": 0.25, "epsilon": 0.1}),
     "two angles": lambda: (Angles(2), [3.0, -3.0], {"radius": 0.2, "epsilon": 0.5}),
     "rotations": lambda: (Rotations(), [0.0, 0.0, 0.0, 1.0], {"radius": 0.4, "epsilon": 0.5}),

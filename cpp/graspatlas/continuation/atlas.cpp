@@ -18,8 +18,8 @@ constexpr int kMostCharts = 64;
 constexpr int kLooks = 100;
 // A generation of fewer charts keeps its own order, which packs charts best: threads would mostly wait for each other.
 constexpr int kSmall = 64;
-// In the order of a large one, a chart is far from so many before it, if one of so many to come is.
-constexpr int kFarFrom = 7, kChoices = 24;
+// In a large one, the next chart is the first of so many to come that is far from so many taken before it.
+constexpr int kChoices = 32, kFarFrom = 7;
 // Beside smaller charts rounding and the tolerances of points and polytopes are no longer small.
 constexpr double kSmallestRadius = 1e-7;
 
@@ -33,20 +33,6 @@ void check_options(const AtlasOptions& options, const System& system) {
                 to_text(options.radius));
   if (!(options.epsilon > 0.0) || !(options.epsilon < 1.0))
     throw Error("epsilon must lie between 0 and 1, got " + to_text(options.epsilon));
-}
-
-// 0 ... count - 1 in the order of their bits reversed: 0, 1/2, 1/4, 3/4, 1/8, ... of the way.
-std::vector<int> leaping_order(int count) {
-  int bits = 0;
-  while ((std::int64_t{1} << bits) < count) ++bits;
-  std::vector<int> order;
-  order.reserve(static_cast<std::size_t>(count));
-  for (std::int64_t i = 0; i < std::int64_t{1} << bits; ++i) {
-    std::int64_t reversed = 0;
-    for (int b = 0; b < bits; ++b) reversed |= (i >> b & 1) << (bits - 1 - b);
-    if (reversed < count) order.push_back(static_cast<int>(reversed));
-  }
-  return order;
 }
 
 }  // namespace
@@ -248,11 +234,10 @@ void Atlas::choose_order(Worker& worker) {
     return is_within(&embeddings[static_cast<std::size_t>(i) * size], &embeddings[static_cast<std::size_t>(j) * size],
                      size, distance * distance);
   };
-  const std::vector<int> leaps = leaping_order(count);
   std::vector<int> choices;
   for (int turn = 0, next = 0; turn < count; ++turn) {
-    while (next < count && static_cast<int>(choices.size()) < kChoices) choices.push_back(leaps[next++]);
-    // The choice that is far from the most charts just before it.
+    while (next < count && static_cast<int>(choices.size()) < kChoices) choices.push_back(next++);
+    // If none is far from them all, the one that is so from the most of the last ones.
     const int most = std::min(turn, kFarFrom);
     int best = 0, best_far = -1;
     for (int c = 0; c < static_cast<int>(choices.size()) && best_far < most; ++c) {

@@ -22,10 +22,10 @@ namespace graspatlas {
 /// seen in its own tangent space.
 ///
 /// The charts that are open at one time are a generation; the charts made from them are the next. A small generation is
-/// expanded in its own order by one thread. A large one is expanded in an order that leaps about its front, so that
-/// charts next to each other in the order are mostly far apart. Threads take charts in this order, and a thread waits
-/// while an earlier chart is being expanded that is too near (kIndependent) for the two to leave each other's charts
-/// alone. So the atlas is the one that a single thread would make, to the bit.
+/// expanded in its own order by one thread. In a large one some charts wait for their turn, so that those taken one
+/// after another are mostly far apart. Threads take charts in this order, and a thread waits while an earlier chart is
+/// being expanded that is too near (kIndependent) for the two to leave each other's charts alone. So the atlas is the
+/// one that a single thread would make, to the bit.
 class Atlas {
  public:
   /// Starts with one chart at the point of the manifold nearest x0.
