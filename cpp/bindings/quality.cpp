@@ -1,7 +1,11 @@
+#include <atomic>
 #include <cmath>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "bindings.hpp"
+#include "graspatlas/parallel.hpp"
 #include "graspatlas/quality/force_closure.hpp"
 #include "graspatlas/quality/manipulability.hpp"
 #include "graspatlas/quality/min_weight.hpp"
@@ -32,21 +36,58 @@ void check_wrenches(const DoubleArray& wrenches) {
 }
 
 constexpr py::ssize_t kRowsBetweenSignals = 32;  // so that Ctrl-C is heard
+constexpr py::ssize_t kRowsForThreads = 256;     // fewer rows are done before other threads have started
 
-/// One number for each of n rows, without the GIL.
-template <class Evaluate>
-py::array_t<double> evaluate_rows(py::ssize_t n, Evaluate evaluate) {
+/// evaluate(row) for n rows, without the GIL, on all cores. Each worker has what `make(worker)` returns.
+template <class Make>
+void for_rows(py::ssize_t n, const Make& make) {
+  const int threads = n < kRowsForThreads ? 1 : available_threads();
+  std::vector<decltype(make(0))> evaluate;
+  for (int worker = 0; worker < threads; ++worker) evaluate.push_back(make(worker));
+  std::atomic<bool> interrupted{false};
+  py::gil_scoped_release release;
+  parallel_for(threads, n, [&](int worker, std::int64_t first, std::int64_t last) {
+    for (std::int64_t row = first; row < last && !interrupted; ++row) {
+      evaluate[static_cast<std::size_t>(worker)](row);
+      if (worker == 0 && row % kRowsBetweenSignals == kRowsBetweenSignals - 1) {
+        py::gil_scoped_acquire acquire;
+        if (PyErr_CheckSignals() != 0) interrupted = true;
+      }
+    }
+  });
+  if (interrupted) {
+    py::gil_scoped_acquire acquire;
+    throw py::error_already_set();
+  }
+}
+
+/// One number for each of n rows; see for_rows.
+template <class Make>
+py::array_t<double> evaluate_rows(py::ssize_t n, const Make& make) {
   py::array_t<double> out(n);
   double* values = out.mutable_data();
-  py::gil_scoped_release release;
-  for (py::ssize_t i = 0; i < n; ++i) {
-    values[i] = evaluate(i);
-    if (i % kRowsBetweenSignals == kRowsBetweenSignals - 1) {
-      py::gil_scoped_acquire acquire;
-      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    }
-  }
+  for_rows(n, [&make, values](int worker) {
+    return [evaluate = make(worker), values](std::int64_t row) mutable { values[row] = evaluate(row); };
+  });
   return out;
+}
+
+/// A system of its own for each worker but the first.
+std::shared_ptr<GraspSystem> system_of(GraspSystem& system, int worker) {
+  if (worker == 0) return {&system, [](GraspSystem*) {}};
+  return std::shared_ptr<GraspSystem>(static_cast<GraspSystem*>(system.clone().release()));
+}
+
+/// closure.`measure`(x) for each row of X.
+py::array_t<double> evaluate_closure(GraspSystem& system, const DoubleArray& X, double friction,
+                                     double (ForceClosure::*measure)(const double*)) {
+  const double* x = X.data();
+  const int size = system.configuration_size();
+  return evaluate_rows(checked_rows(system, X), [&system, x, size, friction, measure](int worker) {
+    auto own = system_of(system, worker);
+    auto closure = std::make_shared<ForceClosure>(*own, friction);
+    return [own, closure, x, size, measure](std::int64_t row) { return (*closure.*measure)(x + row * size); };
+  });
 }
 
 /// `measure(hull, points)` for each grasp, the points of which are columns.
@@ -55,9 +96,10 @@ py::array_t<double> measure_hulls(const DoubleArray& wrenches, Measure measure) 
   using Points = typename WrenchHull<D>::Points;
   const double* data = wrenches.data();
   const py::ssize_t count = wrenches.shape(1);
-  WrenchHull<D> hull;
-  return evaluate_rows(wrenches.shape(0), [&, data, count](py::ssize_t i) {
-    return measure(hull, Eigen::Map<const Points>(data + i * count * D, D, count));
+  return evaluate_rows(wrenches.shape(0), [measure, data, count](int) {
+    return [hull = std::make_shared<WrenchHull<D>>(), measure, data, count](std::int64_t row) {
+      return measure(*hull, Eigen::Map<const Points>(data + row * count * D, D, count));
+    };
   });
 }
 
@@ -101,9 +143,10 @@ void bind_wrenches(py::module_& module) {
         check_wrenches(wrenches);
         const double* data = wrenches.data();
         const py::ssize_t count = wrenches.shape(1), components = wrenches.shape(2);
-        MinWeight weight;
-        return evaluate_rows(wrenches.shape(0), [&, data, count, components](py::ssize_t i) {
-          return weight.normalized(Eigen::Map<const RowMatrix>(data + i * count * components, count, components));
+        return evaluate_rows(wrenches.shape(0), [data, count, components](int) {
+          return [weight = std::make_shared<MinWeight>(), data, count, components](std::int64_t row) {
+            return weight->normalized(Eigen::Map<const RowMatrix>(data + row * count * components, count, components));
+          };
         });
       },
       py::arg("wrenches"),
@@ -120,12 +163,14 @@ void bind_quality(py::module_& module) {
         py::array_t<double> out(std::vector<py::ssize_t>{n, dof});
         const double* x = X.data();
         double* axes = out.mutable_data();
-        {
-          py::gil_scoped_release release;
-          Manipulability manipulability(system, length_unit);
-          for (py::ssize_t i = 0; i < n; ++i)
-            manipulability.semi_axes(x + i * system.configuration_size(), axes + i * dof);
-        }
+        const int size = system.configuration_size();
+        for_rows(n, [&system, x, axes, dof, size, length_unit](int worker) {
+          auto own = system_of(system, worker);
+          auto manipulability = std::make_shared<Manipulability>(*own, length_unit);
+          return [own, manipulability, x, axes, dof, size](std::int64_t row) {
+            manipulability->semi_axes(x + row * size, axes + row * dof);
+          };
+        });
         return out;
       },
       py::arg("system"), py::arg("X"), py::arg("length_unit"),
@@ -133,20 +178,14 @@ void bind_quality(py::module_& module) {
   module.def(
       "force_closure_margins",
       [](GraspSystem& system, const DoubleArray& X, double friction) {
-        const py::ssize_t n = checked_rows(system, X);
-        const double* x = X.data();
-        ForceClosure closure(system, friction);
-        return evaluate_rows(n, [&, x](py::ssize_t i) { return closure.margin(x + i * system.configuration_size()); });
+        return evaluate_closure(system, X, friction, &ForceClosure::margin);
       },
       py::arg("system"), py::arg("X"), py::arg("friction"),
       "Force-closure margin of each grasp [n]; zero where a grasp is not force-closed. See force_closure.hpp.");
   module.def(
       "force_closure_slacks",
       [](GraspSystem& system, const DoubleArray& X, double friction) {
-        const py::ssize_t n = checked_rows(system, X);
-        const double* x = X.data();
-        ForceClosure closure(system, friction);
-        return evaluate_rows(n, [&, x](py::ssize_t i) { return closure.slack(x + i * system.configuration_size()); });
+        return evaluate_closure(system, X, friction, &ForceClosure::slack);
       },
       py::arg("system"), py::arg("X"), py::arg("friction"),
       "Force-closure margin of each grasp with its sign [n]; -infinity where there are no internal forces. See "

@@ -5,6 +5,9 @@
 
 namespace graspatlas {
 
+/// Cores that this process may use.
+int available_threads();
+
 /// Calls body(worker) for worker = 0 ... threads - 1 at the same time, worker 0 on the caller's thread, and waits for
 /// all. The first exception that a worker throws is thrown again here.
 ///
