@@ -13,7 +13,7 @@ endef
 .PHONY: demo test sanitize bench compare lint stubs format clean
 
 demo: $(VENV)/.installed
-	$(BIN)/graspatlas optimize schunk_can --require force_closure --require collision_free --output out/schunk_can
+	$(BIN)/graspatlas optimize schunk_can --require force_closure:0.5:0.02 --require collision_free --refine --output out/schunk_can
 	$(BIN)/graspatlas view out/schunk_can --picture out/schunk_can/grasps.png --html out/schunk_can/grasps.html
 	@echo "Open out/schunk_can/grasps.html in a browser, or run: $(BIN)/graspatlas view out/schunk_can"
 

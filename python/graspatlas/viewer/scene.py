@@ -113,8 +113,9 @@ class Scene:
     def __init__(self, result: Result) -> None:
         self.result = result
         shapes = BodyShapes(result.problem)
-        grasps = (("best", result.best), ("worst", result.worst))
-        size = size_of(body_parts(shapes, result.best))
+        best = result.refined_best if result.refinement else result.best
+        grasps = (("best", best), ("worst", result.worst))
+        size = size_of(body_parts(shapes, best))
         sides = [(name, grasp, *grasp_parts(shapes, grasp, size)) for name, grasp in grasps]
         subjects = [subject_of(parts, grasp, size) for _, grasp, parts, _ in sides]
         self.direction = direction_to(subjects, planar=len(result.best.G) < 6)
