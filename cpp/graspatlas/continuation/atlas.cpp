@@ -162,16 +162,15 @@ bool Atlas::take_task(Worker& worker, Task& task) {
 
 // The tasks of others that are too near, and the place of this one, for those to come.
 void Atlas::find_conflicts(Worker& worker, Task& task, int turn) {
-  worker.task = task.number;
-  task.before.clear();
-  if (small()) return;  // others rest
   const int size = system_.embedding_size();
-  worker.embedding = &embeddings_[static_cast<std::size_t>(turn) * size];
   const double distance = kIndependent * options_.radius;
+  if (!small()) worker.embedding = &embeddings_[static_cast<std::size_t>(turn) * size];
+  task.before.clear();
+  // In a small generation a helper that has begun it may be at its first chart: nothing is done at the same time.
   for (const auto& other : workers_)
-    if (other.get() != &worker && other->task != 0 &&
-        is_within(worker.embedding, other->embedding, size, distance * distance))
+    if (other->task != 0 && (small() || is_within(worker.embedding, other->embedding, size, distance * distance)))
       task.before.emplace_back(other.get(), other->task);
+  worker.task = task.number;
 }
 
 void Atlas::finish_task(Worker& worker, const Task& task, int made) {
