@@ -15,7 +15,7 @@ namespace {
 // Charts that one task may make: a chart with more to make comes again in the next generation.
 constexpr int kMostCharts = 64;
 // How often a thread looks whether it may go on before it goes to sleep.
-constexpr int kLooks = 100;
+constexpr int kLooks = 1000;
 // A generation of fewer charts keeps its own order, which packs charts best: threads would mostly wait for each other.
 constexpr int kSmall = 64;
 // In a large one, the next chart is the first of so many to come that is far from so many taken before it.
@@ -156,12 +156,13 @@ bool Atlas::take_task(Worker& worker, Task& task) {
     helpers_wanted_.notify_all();
     return false;
   }
-  task.slot = generation_[static_cast<std::size_t>(turns_[position_++])];
+  const int turn = turns_[position_++];
+  task.slot = generation_[static_cast<std::size_t>(turn)];
   task.most = static_cast<int>(std::min<std::int64_t>(kMostCharts, chart_limit_ - made_ - promised_));
   task.number = ++task_count_;
   promised_ += task.most;
   ++running_;
-  find_conflicts(worker, task);
+  find_conflicts(worker, task, turn);
   if (Clock::now() > deadline_) {
     stop_ = true;  // but this task is done
     helpers_wanted_.notify_all();
@@ -174,15 +175,15 @@ bool Atlas::take_task(Worker& worker, Task& task) {
 }
 
 // The tasks of others that are too near, and the place of this one, for those to come.
-void Atlas::find_conflicts(Worker& worker, Task& task) {
-  const double* embedding = worker.expander->embedding_of(task.slot);
+void Atlas::find_conflicts(Worker& worker, Task& task, int turn) {
+  const int size = system_.embedding_size();
   const double distance = kIndependent * options_.radius;
+  if (!small()) worker.embedding = &embeddings_[static_cast<std::size_t>(turn) * size];
   task.before.clear();
+  // In a small generation a helper that has begun it may be at its first chart: nothing is done at the same time.
   for (const auto& other : workers_)
-    if (other->task != 0 &&
-        is_within(embedding, other->embedding.data(), system_.embedding_size(), distance * distance))
+    if (other->task != 0 && (small() || is_within(worker.embedding, other->embedding, size, distance * distance)))
       task.before.emplace_back(other.get(), other->task);
-  worker.embedding.assign(embedding, embedding + system_.embedding_size());
   worker.task = task.number;
 }
 
@@ -226,12 +227,12 @@ void Atlas::choose_order(Worker& worker) {
   turns_.resize(generation_.size());
   std::iota(turns_.begin(), turns_.end(), 0);
   if (small()) return;
-  std::vector<double> embeddings(generation_.size() * static_cast<std::size_t>(size));
+  embeddings_.resize(generation_.size() * static_cast<std::size_t>(size));
   for (std::size_t i = 0; i < generation_.size(); ++i)
-    std::copy_n(worker.expander->embedding_of(generation_[i]), size, &embeddings[i * size]);
+    std::copy_n(worker.expander->embedding_of(generation_[i]), size, &embeddings_[i * size]);
   const double distance = kIndependent * options_.radius;
   const auto near = [&](int i, int j) {
-    return is_within(&embeddings[static_cast<std::size_t>(i) * size], &embeddings[static_cast<std::size_t>(j) * size],
+    return is_within(&embeddings_[static_cast<std::size_t>(i) * size], &embeddings_[static_cast<std::size_t>(j) * size],
                      size, distance * distance);
   };
   std::vector<int> choices;

@@ -68,8 +68,8 @@ class Atlas {
   struct Worker {
     std::unique_ptr<System> system;  // its own, but for the first worker
     std::unique_ptr<Expander> expander;
-    std::int64_t task = 0;          // number of the one that it is at; 0: none
-    std::vector<double> embedding;  // of the chart being expanded
+    std::int64_t task = 0;              // number of the one that it is at; 0: none
+    const double* embedding = nullptr;  // of the chart being expanded, in a large generation
   };
   struct Task {
     std::int64_t number;
@@ -83,7 +83,7 @@ class Atlas {
   void restore(const Checkpoint& saved);
   void work(Worker& worker);
   bool take_task(Worker& worker, Task& task);
-  void find_conflicts(Worker& worker, Task& task);
+  void find_conflicts(Worker& worker, Task& task, int turn);
   void finish_task(Worker& worker, const Task& task, int made);
   bool may_take() const;
   bool next_generation(Worker& worker);
@@ -100,6 +100,7 @@ class Atlas {
   std::vector<int> order_;  // slots in the order of the algorithm
 
   std::vector<int> generation_, turns_;  // slots of the charts to expand, and the order to take them in
+  std::vector<double> embeddings_;       // of the charts of a large generation
   std::size_t position_ = 0;             // in turns_
   std::size_t next_first_ = 0;           // in order_: where the next generation begins
   std::vector<int> again_;               // charts that made as many as one task may, or were opened again
