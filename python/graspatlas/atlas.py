@@ -231,10 +231,10 @@ class Atlas:
             if displacement @ displacement - u @ u > self.epsilon**2:
                 continue
             normals, offsets, _ = self.facets(chart)
-            excess = float((normals @ u - offsets).max())
-            if excess >= best_distance:
+            excess = normals @ u - offsets
+            if excess.max() >= best_distance:
                 continue
-            distance = 0.0 if excess <= 0.0 else _distance_to_polytope(u, normals, offsets)
+            distance = 0.0 if excess.max() <= 0.0 else float(np.linalg.norm(shortest_way(normals, excess)))
             if distance < best_distance and self._leads_to(chart, u, point):
                 best, best_distance = chart, distance
             if best_distance == 0.0:
@@ -318,12 +318,14 @@ class Atlas:
 _SCALARS = ("system", "radius", "epsilon", "status", "seconds")
 
 
-def _distance_to_polytope(u: Array, normals: Array, offsets: Array) -> float:
-    """Distance from u to {w : normals w <= offsets}, by the dual least-squares problem with signs."""
-    # min |d|^2 / 2 s.t. normals (u + d) <= offsets has the dual solution d = -normals' z, z >= 0. Lawson and Hanson's
-    # least-distance transformation solves it by one non-negative least-squares problem.
-    excess = normals @ u - offsets
+def shortest_way(normals: Array, excess: Array) -> Array:
+    """Shortest d [k] with normals d <= -excess: from a point to a polytope, whose facets it is beyond by the excess.
+
+    Source: C. L. Lawson and R. J. Hanson, "Solving Least Squares Problems", Chapter 23: least-distance programming as a
+    non-negative least-squares problem.
+    """
     A = np.vstack([-normals.T, excess[None]])
-    z, _ = nnls(A, np.r_[np.zeros(len(u)), 1.0])
-    r = A @ z - np.r_[np.zeros(len(u)), 1.0]
-    return float(np.linalg.norm(r[:-1] / r[-1]))
+    goal = np.zeros(len(A))
+    goal[-1] = 1.0
+    r = A @ nnls(A, goal)[0] - goal
+    return np.asarray(-r[:-1] / r[-1])

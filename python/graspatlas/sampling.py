@@ -27,11 +27,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import nnls
 from tqdm import tqdm
 
 from graspatlas import _core
-from graspatlas.atlas import Atlas
+from graspatlas.atlas import Atlas, shortest_way
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasp, Grasps
 from graspatlas.quality import evaluate
@@ -349,17 +348,8 @@ def _nearest_points(U: Array, normals: Array, offsets: Array) -> Array:
     moved = U - excess[np.arange(len(U)), worst, None] * normals[worst]
     # The nearest point of one half-space is that of the polytope if it lies in the polytope; else an edge is nearest.
     for i in np.flatnonzero((moved @ normals.T - offsets).max(axis=1) > ROUNDING):
-        moved[i] = U[i] + _shortest_way(normals, excess[i])
+        moved[i] = U[i] + shortest_way(normals, excess[i])
     return np.asarray(moved)
-
-
-def _shortest_way(normals: Array, excess: Array) -> Array:
-    """Shortest d with normals d <= -excess: Lawson and Hanson's transformation to non-negative least squares."""
-    A = np.vstack([-normals.T, excess[None]])
-    goal = np.zeros(len(A))
-    goal[-1] = 1.0
-    r = A @ nnls(A, goal)[0] - goal
-    return np.asarray(-r[:-1] / r[-1])
 
 
 class _Block:
