@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <limits>
+#include <memory>
 
 #include "graspatlas/continuation/atlas.hpp"
 #include "graspatlas/continuation/toy_systems.hpp"
@@ -71,7 +72,7 @@ class TwoSpheres : public System {
 double covered(const Atlas& atlas) {
   double sum = 0.0;
   for (std::int64_t i = 0; i < atlas.count(); ++i) {
-    const auto& p = atlas.polytope(i);
+    const auto& p = atlas.chart(i).polytope;
     if (p.dimension() == 1) {
       double low = 0.0, high = 0.0;
       for (int v = 0; v < p.vertex_count(); ++v) {
@@ -96,7 +97,7 @@ double covered(const Atlas& atlas) {
   return sum;
 }
 
-void check(const Atlas& atlas) {
+void check(const Atlas& atlas, double radius) {
   System& system = const_cast<System&>(atlas.system());
   const int n = system.tangent_size(), k = system.dimension();
   std::vector<double> R(system.equation_count()), J(static_cast<std::size_t>(system.equation_count()) * n), d(n);
@@ -111,22 +112,58 @@ void check(const Atlas& atlas) {
         require(std::abs(slope) <= 1e-6, "tangent bases lie in the null space of the Jacobian");
       }
     }
-    require(atlas.polytope(i).vertex_count() > k, "polytopes have vertices");
+    require(atlas.chart(i).polytope.vertex_count() > k, "polytopes have vertices");
   }
-  for (const auto& [i, j] : atlas.neighbour_pairs()) {
-    require(0 <= i && i < j && j < atlas.count(), "neighbours are charts");
-    system.difference(atlas.center(i), atlas.center(j), d.data());
-    double squared = 0.0;
-    for (double c : d) squared += c * c;
-    require(std::sqrt(squared) <= 2.0 * atlas.options().radius + 1e-12, "neighbours are at most 2 r apart");
+  for (std::int64_t j = 0; j < atlas.count(); ++j)
+    for (int a = 0; a < atlas.chart(j).neighbour_count; ++a) {
+      const int i = atlas.number(atlas.chart(j).neighbours[a]);
+      require(0 <= i && i < j, "neighbours are older charts");
+      system.difference(atlas.center(i), atlas.center(j), d.data());
+      double squared = 0.0;
+      for (double c : d) squared += c * c;
+      require(std::sqrt(squared) <= 2.0 * radius + 1e-12, "neighbours are at most 2 r apart");
+    }
+}
+
+void require_same(const Atlas& a, const Atlas& b, const char* what) {
+  require(a.count() == b.count(), what);
+  for (std::int64_t i = 0; i < a.count(); ++i) {
+    require(std::equal(a.center(i), a.center(i) + a.system().configuration_size(), b.center(i)), what);
+    const auto &p = a.chart(i).polytope, &q = b.chart(i).polytope;
+    require(p.vertex_count() == q.vertex_count(), what);
+    for (int v = 0; v < p.vertex_count(); ++v)
+      require(std::equal(p.vertex(v), p.vertex(v) + p.dimension(), q.vertex(v)) && p.state(v) == q.state(v), what);
   }
+}
+
+// The same atlas, made anew from a checkpoint after every few charts.
+void from_checkpoints(System& system, const std::vector<double>& x0, double radius, double epsilon,
+                      const Atlas& whole) {
+  auto atlas = std::make_unique<Atlas>(system, x0.data(), options(radius, epsilon));
+  while (!atlas->complete()) {
+    atlas->expand(atlas->count() + 13, kForever);
+    atlas = std::make_unique<Atlas>(system, atlas->save(0), options(radius, epsilon), 2);
+  }
+  require_same(whole, *atlas, "an atlas from checkpoints is the atlas in one go");
+  graspatlas::Checkpoint damaged = whole.save(0);
+  damaged.centers.pop_back();
+  bool refused = false;
+  try {
+    Atlas(system, damaged, options(radius, epsilon));
+  } catch (const graspatlas::Error&) {
+    refused = true;
+  }
+  require(refused, "a damaged checkpoint is refused");
 }
 
 std::int64_t trace(System& system, const std::vector<double>& x0, double radius, double epsilon, double size = 0.0) {
   Atlas atlas(system, x0.data(), options(radius, epsilon));
   atlas.expand(kNoLimit, kForever);
   require(atlas.complete(), "the atlas is complete");
-  check(atlas);
+  check(atlas, radius);
+  Atlas other(system, x0.data(), options(radius, epsilon), 3);
+  other.expand(kNoLimit, kForever);
+  require_same(atlas, other, "threads make the same atlas");
   if (size > 0.0) require(std::abs(covered(atlas) / size - 1.0) < 0.05, "the charts cover the whole");
   return atlas.count();
 }
@@ -138,9 +175,10 @@ void in_slices(System& system, const std::vector<double>& x0, double radius, dou
   for (std::int64_t limit = 1; !atlas.complete(); limit += 7) {
     atlas.expand(limit, limit % 2 ? kForever : 0.0);
     require(atlas.count() <= limit || limit == 1, "the limit of charts holds");
-    check(atlas);
+    check(atlas, radius);
   }
   require(atlas.count() == count, "an atlas in slices is the atlas in one go");
+  from_checkpoints(system, x0, radius, epsilon, atlas);
   atlas.expand(kNoLimit, kForever);
   atlas.expand(-1, -1.0);
   require(atlas.count() == count, "a complete atlas stays as it is");
@@ -185,7 +223,7 @@ void atlases() {
     for (double epsilon : {1e-12, 0.5, 1.0 - 1e-12}) {
       Atlas atlas(sphere, std::vector<double>{0.0, 0.6, 0.8}.data(), options(radius, epsilon));
       atlas.expand(200, 0.2);
-      check(atlas);
+      check(atlas, radius);
     }
 }
 

@@ -1,5 +1,7 @@
 #include "graspatlas/continuation/neighbours.hpp"
 
+#include <algorithm>
+
 #include "strain.hpp"
 
 namespace strain {
@@ -24,17 +26,19 @@ void compare(int size, int count, unsigned seed, Point (*next)(Random&, int, int
   graspatlas::Neighbours tree(size);
   std::vector<Point> points;
   std::vector<int> found;
+  graspatlas::Neighbours::Scratch scratch;
   const Point origin(size, 0.0);
-  tree.within(origin.data(), 1.0, found);
+  tree.within(origin.data(), 1.0, found, scratch);
   require(found.empty(), "an empty tree finds nothing");
   for (int i = 0; i < count; ++i) {
     points.push_back(next(random, size, i));
-    tree.insert(points.back().data());
+    tree.insert(points.back().data(), i);
     if (random.below(20)) continue;
     const Point& from = points[random.below(i + 1)];
     const double distances[] = {0.0, 1e-9, 0.1, 1.0, 1e200};
     for (double distance : distances) {
-      tree.within(from.data(), distance, found);
+      tree.within(from.data(), distance, found, scratch);
+      std::sort(found.begin(), found.end());
       require(found == by_comparing_all(points, from, distance), "the tree finds what comparing all finds");
     }
   }

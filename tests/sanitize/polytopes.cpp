@@ -75,15 +75,16 @@ void cut_at_random(int k, int polytopes, int cuts, unsigned seed) {
   const double half_width = 1.0;
   for (int p = 0; p < polytopes; ++p) {
     Polytope polytope(k, half_width);
+    Polytope::Scratch scratch;
     std::vector<HalfSpace> made;
     for (int c = 0; c < cuts; ++c) {
       const HalfSpace next = troublesome(polytope, made, random);
-      polytope.cut(next.normal.data(), next.offset, c);
+      polytope.cut(next.normal.data(), next.offset, c, scratch);
       made.push_back(next);
       if (next.offset < 1e-9) break;  // it may have become flat: cutting goes on, what is inside is not defined
     }
     if (made.back().offset >= 1e-9) check(polytope, made, half_width, random);
-    for (int c = 0; c < 5; ++c) polytope.cut(random.direction(k).data(), 0.0, c);
+    for (int c = 0; c < 5; ++c) polytope.cut(random.direction(k).data(), 0.0, c, scratch);
     const int vertex = polytope.expandable_vertex(0.1);
     if (vertex >= 0) polytope.close(vertex, 1);
   }
@@ -93,10 +94,11 @@ void cut_at_random(int k, int polytopes, int cuts, unsigned seed) {
 void cut_round(int k, int cuts) {
   Random random(7);
   Polytope polytope(k, 1.0);
+  Polytope::Scratch scratch;
   std::vector<HalfSpace> made;
   for (int c = 0; c < cuts; ++c) {
     made.push_back({random.direction(k), 0.5});
-    polytope.cut(made.back().normal.data(), 0.5, c);
+    polytope.cut(made.back().normal.data(), 0.5, c, scratch);
   }
   check(polytope, made, 1.0, random);
   require(polytope.expandable_vertex(0.5) >= 0, "a polytope round a ball has vertices outside it");
