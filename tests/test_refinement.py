@@ -182,6 +182,21 @@ def test_an_interrupted_refinement_keeps_what_it_has(monkeypatch: pytest.MonkeyP
     assert not none.converged[0]
 
 
+def test_an_interrupted_climb_in_f_keeps_those_in_r(monkeypatch: pytest.MonkeyPatch) -> None:
+    result = ga.optimize(ga.load_problem("planar_hand"), radius=0.25)
+    inside = ga.refine(result)
+
+    def impatient(*arguments: object, **options: object) -> ga.Climb:
+        if options.get("all_motions"):
+            raise KeyboardInterrupt
+        return ga.climb(*arguments, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("graspatlas.refinement.climb", impatient)
+    kept = ga.refine(result, all_motions=True)
+    assert not kept.complete
+    np.testing.assert_array_equal(kept.qualities, inside.qualities)
+
+
 def test_the_command_line_refines(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["optimize", "planar_hand", "--refine", "--quality", "inverse_condition_number"]
     words += ["--quality", "smallest_semi_axis", "--output", str(tmp_path)]

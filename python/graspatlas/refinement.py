@@ -37,7 +37,7 @@ class Refinement:
         starts: Chart from which the climb to each began [p].
         converged: False for those that were still climbing when given up: the index may have no maximum there [p].
         all_motions: True when no hand motion was frozen: the grasps lie in F, not only in R.
-        complete: False when interrupted, so that basins may be missing.
+        complete: False when interrupted, so that basins may be missing, or climbs in F.
     """
 
     x: Array
@@ -95,10 +95,9 @@ def refine(result: Result, *, all_motions: bool = False, progress: bool | None =
             # Climbs in R that met go on as one.
             tops = [_top(peak, ends) for peak in peaks_of(result, ends)]
             bar.total = len(charts) + len(tops)
-            starts = starts[tops]
-            reached, ends = [ends[top] for top in tops], []
-            for end in reached:
-                ends.append(climb(result, end.x, all_motions=True))
+            starts, ends = starts[tops], [ends[top] for top in tops]
+            for i, end in enumerate(ends):
+                ends[i] = climb(result, end.x, all_motions=True)
                 bar.update()
     except KeyboardInterrupt:
         complete = False
