@@ -19,22 +19,16 @@ from graspatlas.atlas import Status
 from graspatlas.checkpoints import CheckpointFolder
 from graspatlas.components import Components, SearchStatus, find_components
 from graspatlas.errors import GraspAtlasError
-from graspatlas.files import replaced
+from graspatlas.exit_status import FAILED, INTERRUPTED, MISUSE
 from graspatlas.optimizer import optimize
-from graspatlas.pareto import knee, pareto_front, values_of
-from graspatlas.paths import GraspPath, shortest_path
 from graspatlas.problem_commands import add_problem_commands
 from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.quality import INDICES, quality_name
 from graspatlas.requirements import REQUIREMENTS, parse_requirement
-from graspatlas.result import Result, load_result, writable_folder
-from graspatlas.sampling import Samples, densify
+from graspatlas.result import Result, writable_folder
+from graspatlas.result_commands import add_result_commands
 
 __all__ = ["main"]
-
-FAILED = 1
-MISUSE = 2
-INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -133,44 +127,7 @@ def _parser() -> argparse.ArgumentParser:
     best.add_argument("--json", action="store_true", help="print one JSON object on standard output")
     best.set_defaults(run=_optimize)
 
-    look = commands.add_parser("view", help="show the best and the worst grasp of a result")
-    look.add_argument("result", type=Path, help="folder or file that optimize wrote")
-    look.add_argument("--html", type=Path, metavar="FILE", help="write a page that needs no server instead")
-    look.add_argument("--picture", type=Path, metavar="FILE", help="write a PNG picture instead")
-    look.add_argument("--no-browser", action="store_true", help="do not open a browser, only say where to look")
-    look.set_defaults(run=_view)
-
-    front = commands.add_parser("pareto", help="list the grasps that no other beats in two indices")
-    front.add_argument("result", type=Path, help="folder or file that optimize wrote")
-    front.add_argument("first", metavar="FIRST", help="quality index, the best by which comes first")
-    front.add_argument("second", metavar="SECOND", help="another quality index")
-    front.add_argument("--picture", type=Path, metavar="FILE", help="write a figure (.png, .pdf or .svg)")
-    front.add_argument("--json", action="store_true", help="print one JSON object on standard output")
-    front.set_defaults(run=_pareto)
-
-    denser = commands.add_parser("densify", help="read the index between the charts' centres, and write samples.npz")
-    denser.add_argument("result", type=Path, help="folder or file that optimize wrote; samples.npz is written beside")
-    denser.add_argument("spacing", type=float, metavar="SPACING", help="distance of samples, in the unit of the radius")
-    denser.add_argument(
-        "--share", type=float, default=1.0, metavar="F", help="only the charts where the index jumps most"
-    )
-    denser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
-    denser.set_defaults(run=_densify)
-    way = commands.add_parser("path", help="find the shortest path between two grasps of a result that never lets go")
-    way.add_argument("result", type=Path, help="folder or file that optimize wrote")
-    where = "number of a chart, or first, best or worst"
-    way.add_argument("--from", dest="start", default="first", metavar="CHART", help=f"{where}; first by default")
-    way.add_argument("--to", dest="end", default="best", metavar="CHART", help=f"{where}; best by default")
-    way.add_argument("--feasible", action="store_true", help="only through grasps that meet the result's requirements")
-    way.add_argument("--csv", type=Path, metavar="FILE", help="write a table: joints, pose of the object, quality")
-    way.add_argument("--html", type=Path, metavar="FILE", help="write a page with a slider that needs no server")
-    way.add_argument("--picture", type=Path, metavar="FILE", help="write a PNG picture of six grasps on the way")
-    way.set_defaults(run=_path)
-
-    verify = commands.add_parser("check-result", help="verify a result again, from the problem that it carries")
-    verify.add_argument("result", type=Path, help="folder or file that optimize wrote")
-    verify.set_defaults(run=_check_result)
-
+    add_result_commands(commands)
     _add_sweep(commands)
 
     again = commands.add_parser(
@@ -337,134 +294,6 @@ def _refined_lines(result: Result) -> list[str]:
 
 def _row(values: NDArray[np.float64]) -> str:
     return "(" + ", ".join(f"{value:.4f}" for value in values) + ")"
-
-
-def _view(options: argparse.Namespace) -> int:
-    result = load_result(options.result)
-    from graspatlas.viewer import export_html, save_picture, view  # slow to import
-
-    if options.html:
-        export_html(result, options.html)
-        print(f"wrote {options.html}: open it in a browser", file=sys.stderr)
-    if options.picture:
-        save_picture(result, options.picture)
-        print(f"wrote {options.picture}", file=sys.stderr)
-    if not options.html and not options.picture:
-        view(result, open_browser=not options.no_browser)
-    return 0
-
-
-def _pareto(options: argparse.Namespace) -> int:
-    kinds = (".png", ".pdf", ".svg")
-    if options.picture and options.picture.suffix not in kinds:
-        raise GraspAtlasError(f"picture '{options.picture}' must end in one of {', '.join(kinds)}")
-    result = load_result(options.result)
-    names = (options.first, options.second)
-    front = pareto_front(result, *names)
-    values = values_of(result, *names)[front]
-    at = knee(values)
-    if options.picture:
-        from graspatlas.viewer.figures import plot_pareto  # slow to import
-
-        with replaced(options.picture) as stream:
-            plot_pareto(result, *names).savefig(stream, format=options.picture.suffix[1:])
-        print(f"wrote {options.picture}", file=sys.stderr)
-    if options.json:
-        rows = [{"chart": int(c), "values": v.tolist()} for c, v in zip(front, values, strict=True)]
-        print(json.dumps({"indices": names, "front": rows, "knee": None if at is None else int(front[at])}))
-        return 0
-    print(f"{result.problem.name}: {len(front)} of {int(result.feasible.sum())} grasps are on the Pareto front")
-    print(f"  {'chart':>8} {names[0]:>26} {names[1]:>26}")
-    for row, (chart, pair) in enumerate(zip(front, values, strict=True)):
-        print(f"  {chart:8} {pair[0]:26.6g} {pair[1]:26.6g}{'  knee' if row == at else ''}")
-    return 0
-
-
-def _densify(options: argparse.Namespace) -> int:
-    result = load_result(options.result)
-    folder = writable_folder(options.result if options.result.is_dir() else options.result.parent)
-    samples = densify(result, options.spacing, share=options.share, progress=True)
-    with replaced(folder / "samples.npz") as stream:
-        np.savez_compressed(stream, **samples.to_arrays())
-    best = samples.best if samples.feasible.any() else None
-    if options.json:
-        summary = {
-            "n_samples": len(samples),
-            "n_feasible": int(samples.feasible.sum()),
-            "not_converged": samples.not_converged,
-            "outside": samples.outside,
-            "complete": samples.complete,
-            "best": best and {"quality": best.quality, "chart": best.chart, "x": best.x.tolist()},
-            "best_chart": result.best.quality if result.feasible.any() else None,
-        }
-        print(json.dumps(summary))
-    else:
-        print("\n".join(_sample_lines(result, samples, folder)))
-    if not samples.complete:
-        return INTERRUPTED
-    return 0 if best else FAILED
-
-
-def _sample_lines(result: Result, samples: Samples, folder: Path) -> list[str]:
-    lines = [
-        f"{result.problem.name}: {len(samples)} samples in {len(np.unique(samples.charts))} charts"
-        + ("" if samples.complete else "; interrupted"),
-        f"  {samples.outside} were outside the bounds, {samples.not_converged} did not reach the manifold",
-    ]
-    if result.requirements:
-        lines.append(f"  {samples.feasible.sum()} meet the requirements")
-    if samples.feasible.any():
-        best = samples.best
-        lines.append(f"  {quality_name(result.quality)}: best sample {best.quality:.9g} (chart {best.chart})")
-    else:
-        lines.append("  no best sample: relax a requirement, or fill a larger share")
-    if result.feasible.any():
-        lines.append(f"  best centre of a chart {result.best.quality:.9g}")
-    return [*lines, f"  written to {folder / 'samples.npz'}"]
-
-
-def _path(options: argparse.Namespace) -> int:
-    result = load_result(options.result)
-    start, end = (_chart(result, name) for name in (options.start, options.end))
-    path = shortest_path(result, start, end, feasible=options.feasible, progress=True)
-    print(
-        f"{result.problem.name}: path of length {path.length:.6g} from chart {start} to chart {end}, {len(path)} points"
-    )
-    if not path.tight:
-        print("  cut short: a shorter one may exist nearby")
-    print(f"  largest residual {path.residuals.max():.1e}")
-    if path.knows_quality:
-        lowest = int(path.qualities.argmin())
-        print(f"  {quality_name(result.quality)}: smallest {path.qualities[lowest]:.6g}, at point {lowest}")
-    if result.requirements and path.knows_requirements:
-        print(f"  {path.feasible.sum()} of {len(path)} points meet the requirements")
-    from graspatlas.viewer import export_html, save_picture
-
-    writers = ((options.csv, GraspPath.save_csv), (options.html, export_html), (options.picture, save_picture))
-    for file, write in writers:
-        if file:
-            write(path, file)
-            print(f"wrote {file}", file=sys.stderr)
-    return 0
-
-
-def _chart(result: Result, name: str) -> int:
-    """The chart that a word names."""
-    if name == "first":
-        return 0
-    if name in ("best", "worst"):
-        return int(getattr(result, name).chart)
-    if name.isascii() and name.isdigit():
-        return int(name)
-    raise GraspAtlasError(f"'{name}' names no grasp; give the number of a chart, or first, best or worst")
-
-
-def _check_result(options: argparse.Namespace) -> int:
-    result = load_result(options.result)
-    report = result.check()
-    print(f"{result.problem.name}: {result.atlas.n_charts} charts, {result.status}")
-    print(report)
-    return 0 if report else FAILED
 
 
 def _sweep(options: argparse.Namespace) -> int:
