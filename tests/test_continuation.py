@@ -17,7 +17,7 @@ TWO_JOINTS = robot(chain("f", (0.0, 0.0, 0.1), ["0 0 1", "0 1 0"], 0.05, "contin
 TOYS = {
     "circle": (lambda: Sphere(2), [1, 0], 0.1, 0.1, (58, 72), 2 * np.pi, 0.01),
     "sphere": (lambda: Sphere(3), [0, 0, 1], 0.1, 0.1, (1135, 1205), 4 * np.pi, 0.01),
-    "3-sphere": (lambda: Sphere(4), [0, 0, 0, 1], 0.2, 0.1, (2200, 2450), 2 * np.pi**2, 0.03),
+    "3-sphere": (lambda: Sphere(4), [0, 0, 0, 1], 0.2, 0.1, (2100, 2450), 2 * np.pi**2, 0.03),
     "4-sphere": (lambda: Sphere(5), [0, 0, 0, 0, 1], 0.4, 0.1, (2500, 3500), 8 * np.pi**2 / 3, 0.05),
     "torus": (lambda: Torus(0.8, 0.5), [1.3, 0, 0], 0.1, 0.1, (1440, 1480), 1.6 * np.pi**2, 0.02),
     "one angle": (lambda: Angles(1), [0], 0.1, 0.5, (58, 72), 2 * np.pi, 1e-9),

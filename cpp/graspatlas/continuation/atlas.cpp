@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <string>
 #include <thread>
 
@@ -16,10 +15,11 @@ namespace {
 constexpr int kMostCharts = 64;
 // How often a thread looks whether it may go on before it goes to sleep.
 constexpr int kLooks = 1000;
-// A generation of fewer charts keeps its own order, which packs charts best: threads would mostly wait for each other.
-constexpr int kSmall = 64;
-// In a large one, the next chart is the first of so many to come that is far from so many taken before it.
-constexpr int kChoices = 32, kFarFrom = 7;
+// A generation of fewer charts is left to one thread: others would mostly wait for it.
+constexpr int kTiny = 16;
+// A generation of fewer charts keeps its own order, which packs them best. A larger one is taken in so many parts at
+// once, of so many charts at least.
+constexpr int kSmall = 48, kMostParts = 16, kSmallestPart = 8;
 // Beside smaller charts rounding and the tolerances of points and polytopes are no longer small.
 constexpr double kSmallestRadius = 1e-7;
 
@@ -96,6 +96,8 @@ void Atlas::expand(std::int64_t chart_limit, double seconds) {
   chart_limit_ = chart_limit;
   made_ = count();
   promised_ = 0;
+  admitted_ = 0;
+  window_.fill({});
   stop_ = false;
   try {
     run_on_threads(threads(), [this](int worker) { work(*workers_[static_cast<std::size_t>(worker)]); });
@@ -107,91 +109,92 @@ void Atlas::expand(std::int64_t chart_limit, double seconds) {
 }
 
 void Atlas::work(Worker& worker) {
-  Task task;
-  while (take_task(worker, task)) {
-    int made = 0;
-    try {
-      made = worker.expander->expand(task.slot, static_cast<ChartKey>(task.number) * kMostCharts, task.most);
-    } catch (...) {
-      finish_task(worker, task, task.most);  // as if more were to be made
-      const std::lock_guard lock(mutex_);
-      stop_ = true;
-      changed_.notify_all();
-      helpers_wanted_.notify_all();
-      throw;
+  try {
+    while (Task* const task = take_task(worker)) {
+      int made = task->most;  // should it fail: as if more were to be made
+      try {
+        made = worker.expander->expand(task->slot, static_cast<ChartKey>(task->number) * kMostCharts, task->most);
+      } catch (...) {
+        finish_task(worker, *task, made);
+        throw;
+      }
+      finish_task(worker, *task, made);
     }
-    finish_task(worker, task, made);
+  } catch (...) {
+    stop_after_error();
+    throw;
   }
 }
 
 // Waits for what another thread does. Mostly that is a matter of microseconds, in which a thread is not worth stopping.
-template <class Condition>
-void Atlas::wait(Lock& lock, Condition condition) {
-  for (int i = 0; i < kLooks && !condition(); ++i) {
-    lock.unlock();
-    std::this_thread::yield();
-    lock.lock();
-  }
-  changed_.wait(lock, condition);
+void Atlas::wait(Lock& lock) {
+  const std::int64_t seen = events_;
+  lock.unlock();
+  for (int i = 0; i < kLooks && events_ == seen; ++i) std::this_thread::yield();
+  lock.lock();
+  changed_.wait(lock, [this, seen] { return events_ != seen; });
 }
 
-// Towards the limit of charts, tasks come one by one and with what is left, so that it is met exactly.
-bool Atlas::may_take() const {
-  if (stop_ || running_ == 0) return true;
-  return position_ < turns_.size() && chart_limit_ - made_ - promised_ >= kMostCharts;
-}
-
-// The next chart to expand, once that can begin; false when there is none, or the time is up.
-bool Atlas::take_task(Worker& worker, Task& task) {
+// The next chart to expand that nothing must be waited for; none when there is none, or the limit or the time is up.
+Atlas::Task* Atlas::take_task(Worker& worker) {
   Lock lock(mutex_);
   const bool helper = &worker != workers_.front().get();
-  do {
-    if (helper) helpers_wanted_.wait(lock, [this] { return stop_ || !small(); });
-    wait(lock, [this, helper] { return may_take() || (helper && small()); });
-    if (stop_) return false;
-  } while (helper && small());
-  if ((position_ == turns_.size() && !next_generation(worker)) || made_ >= chart_limit_) {
-    stop_ = true;
-    changed_.notify_all();
-    helpers_wanted_.notify_all();
-    return false;
+  while (true) {
+    if (helper) helpers_wanted_.wait(lock, [this] { return stop_ || !tiny(); });
+    if (Task* const task = first_free_task()) {
+      task->running = true;
+      return task;
+    }
+    if (may_admit()) {
+      admit_task(kMostCharts);
+    } else if (admitted_ > 0) {
+      wait(lock);
+    } else if (stop_) {
+      return nullptr;
+    } else if ((position_ == turns_.size() && !next_generation(worker)) || made_ >= chart_limit_) {
+      stop();
+    } else if (!may_admit()) {
+      // Towards the limit of charts, tasks come one by one and with what is left, so that it is met exactly.
+      admit_task(chart_limit_ - made_);
+    }
   }
-  const int turn = turns_[position_++];
-  task.slot = generation_[static_cast<std::size_t>(turn)];
-  task.most = static_cast<int>(std::min<std::int64_t>(kMostCharts, chart_limit_ - made_ - promised_));
-  task.number = ++task_count_;
-  promised_ += task.most;
-  ++running_;
-  find_conflicts(worker, task, turn);
-  if (Clock::now() > deadline_) {
-    stop_ = true;  // but this task is done
-    helpers_wanted_.notify_all();
-  }
-  wait(lock, [&task] {
-    return std::none_of(task.before.begin(), task.before.end(),
-                        [](const auto& other) { return other.first->task == other.second; });
-  });
-  return true;
 }
 
-// The tasks of others that are too near, and the place of this one, for those to come.
-void Atlas::find_conflicts(Worker& worker, Task& task, int turn) {
+bool Atlas::may_admit() const {
+  return !stop_ && admitted_ < kWindow && position_ < turns_.size() && chart_limit_ - made_ - promised_ >= kMostCharts;
+}
+
+// The first in the window that nobody is at, and that nothing must be waited for.
+Atlas::Task* Atlas::first_free_task() {
+  Task* first = nullptr;
+  for (Task& task : window_)
+    if (task.number != 0 && !task.running && task.before == 0 && (!first || task.number < first->number)) first = &task;
+  return first;
+}
+
+// Puts the next chart of the generation into the window, where there must be room.
+void Atlas::admit_task(std::int64_t most) {
   const int size = system_.embedding_size();
   const double distance = kIndependent * options_.radius;
-  if (!small()) worker.embedding = &embeddings_[static_cast<std::size_t>(turn) * size];
-  task.before.clear();
-  // In a small generation a helper that has begun it may be at its first chart: nothing is done at the same time.
-  for (const auto& other : workers_)
-    if (other->task != 0 && (small() || is_within(worker.embedding, other->embedding, size, distance * distance)))
-      task.before.emplace_back(other.get(), other->task);
-  worker.task = task.number;
+  const auto turn = static_cast<std::size_t>(turns_[position_++]);
+  Task* place = nullptr;
+  std::uint32_t before = 0;
+  for (int i = 0; i < kWindow; ++i) {
+    if (window_[i].number == 0)
+      place = &window_[i];
+    else if (is_within(&embeddings_[turn * size], window_[i].embedding, size, distance * distance))
+      before |= std::uint32_t{1} << i;
+  }
+  *place = {++task_count_, generation_[turn], static_cast<int>(most), &embeddings_[turn * size], before, false};
+  ++admitted_;
+  promised_ += most;
+  if (Clock::now() > deadline_) stop();  // but what is in the window is done
 }
 
-void Atlas::finish_task(Worker& worker, const Task& task, int made) {
+void Atlas::finish_task(Worker& worker, Task& task, int made) {
   const std::lock_guard lock(mutex_);
   made_ += made;
   promised_ -= task.most;
-  --running_;
   if (made >= task.most) {
     if (task.most < kMostCharts)
       --position_;  // it was the last: it goes on where it stopped
@@ -201,8 +204,34 @@ void Atlas::finish_task(Worker& worker, const Task& task, int made) {
   std::vector<int>& reopened = worker.expander->reopened();
   again_.insert(again_.end(), reopened.begin(), reopened.end());
   reopened.clear();
-  worker.task = 0;
+  free_place(task);
+}
+
+void Atlas::free_place(Task& task) {
+  const std::uint32_t place = std::uint32_t{1} << (&task - window_.data());
+  for (Task& other : window_) other.before &= ~place;
+  task.number = 0;
+  --admitted_;
+  ++events_;
   changed_.notify_all();
+}
+
+void Atlas::stop() {
+  stop_ = true;
+  ++events_;
+  changed_.notify_all();
+  helpers_wanted_.notify_all();
+}
+
+// What was admitted and not begun is kept for later.
+void Atlas::stop_after_error() {
+  const std::lock_guard lock(mutex_);
+  for (Task& task : window_) {
+    if (task.number == 0 || task.running) continue;
+    again_.push_back(task.slot);
+    free_place(task);
+  }
+  stop();
 }
 
 // All charts that are new, in their order, and those that were not done. False when there is none.
@@ -215,43 +244,24 @@ bool Atlas::next_generation(Worker& worker) {
   again_.clear();
   choose_order(worker);
   position_ = 0;
-  if (!small()) helpers_wanted_.notify_all();
+  if (!tiny()) helpers_wanted_.notify_all();
   return !generation_.empty();
 }
 
-bool Atlas::small() const { return static_cast<int>(generation_.size()) < kSmall; }
+bool Atlas::tiny() const { return static_cast<int>(generation_.size()) < kTiny; }
 
-// The order in which the generation is expanded: it depends on the charts only.
+// The order in which the generation is expanded: it depends on its size only. New charts come in the order of a walk
+// along the front, so parts of it are mostly far apart: charts are taken from the beginning of each in turn.
 void Atlas::choose_order(Worker& worker) {
   const int count = static_cast<int>(generation_.size()), size = system_.embedding_size();
-  turns_.resize(generation_.size());
-  std::iota(turns_.begin(), turns_.end(), 0);
-  if (small()) return;
   embeddings_.resize(generation_.size() * static_cast<std::size_t>(size));
   for (std::size_t i = 0; i < generation_.size(); ++i)
     std::copy_n(worker.expander->embedding_of(generation_[i]), size, &embeddings_[i * size]);
-  const double distance = kIndependent * options_.radius;
-  const auto near = [&](int i, int j) {
-    return is_within(&embeddings_[static_cast<std::size_t>(i) * size], &embeddings_[static_cast<std::size_t>(j) * size],
-                     size, distance * distance);
-  };
-  std::vector<int> choices;
-  for (int turn = 0, next = 0; turn < count; ++turn) {
-    while (next < count && static_cast<int>(choices.size()) < kChoices) choices.push_back(next++);
-    // If none is far from them all, the one that is so from the most of the last ones.
-    const int most = std::min(turn, kFarFrom);
-    int best = 0, best_far = -1;
-    for (int c = 0; c < static_cast<int>(choices.size()) && best_far < most; ++c) {
-      int far = 0;
-      while (far < most && !near(choices[c], turns_[turn - 1 - far])) ++far;
-      if (far > best_far) {
-        best = c;
-        best_far = far;
-      }
-    }
-    turns_[turn] = choices[best];
-    choices.erase(choices.begin() + best);
-  }
+  const int parts = count < kSmall ? 1 : std::min(count / kSmallestPart, kMostParts);
+  const int length = (count + parts - 1) / parts;
+  turns_.clear();
+  for (int first = 0; first < length; ++first)
+    for (int turn = first; turn < count; turn += length) turns_.push_back(turn);
 }
 
 // Numbers the charts that have come; no task may be running.

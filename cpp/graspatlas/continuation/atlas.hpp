@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -22,10 +24,10 @@ namespace graspatlas {
 /// seen in its own tangent space.
 ///
 /// The charts that are open at one time are a generation; the charts made from them are the next. A small generation is
-/// expanded in its own order by one thread. In a large one some charts wait for their turn, so that those taken one
-/// after another are mostly far apart. Threads take charts in this order, and a thread waits while an earlier chart is
-/// being expanded that is too near (kIndependent) for the two to leave each other's charts alone. So the atlas is the
-/// one that a single thread would make, to the bit.
+/// expanded in its own order; in a large one charts are taken from several parts of the front in turn. Threads look at
+/// a window of this order, and take the first chart that is far enough (kIndependent) from all before it that are not
+/// done: then the two leave each other's charts alone. So the atlas is the one that a single thread would make, to the
+/// bit.
 class Atlas {
  public:
   /// Starts with one chart at the point of the manifold nearest x0.
@@ -64,17 +66,19 @@ class Atlas {
 
  private:
   using Clock = std::chrono::steady_clock;
+  static constexpr int kWindow = 32;
 
   struct Worker {
     std::unique_ptr<System> system;  // its own, but for the first worker
     std::unique_ptr<Expander> expander;
-    std::int64_t task = 0;              // number of the one that it is at; 0: none
-    const double* embedding = nullptr;  // of the chart being expanded, in a large generation
   };
+  /// A chart to expand.
   struct Task {
-    std::int64_t number;
-    int slot, most;
-    std::vector<std::pair<const Worker*, std::int64_t>> before;  // what must be done first
+    std::int64_t number;      // in the order of the algorithm; 0: this place in the window is free
+    int slot, most;           // the chart, and how many it may make
+    const double* embedding;  // of the chart
+    std::uint32_t before;     // places in the window of those that must be done first
+    bool running;
   };
   using Lock = std::unique_lock<std::mutex>;
 
@@ -82,16 +86,19 @@ class Atlas {
   Atlas(System& system, const AtlasOptions& options, int threads);
   void restore(const Checkpoint& saved);
   void work(Worker& worker);
-  bool take_task(Worker& worker, Task& task);
-  void find_conflicts(Worker& worker, Task& task, int turn);
-  void finish_task(Worker& worker, const Task& task, int made);
-  bool may_take() const;
+  Task* take_task(Worker& worker);
+  Task* first_free_task();
+  void admit_task(std::int64_t most);
+  bool may_admit() const;
+  void finish_task(Worker& worker, Task& task, int made);
+  void free_place(Task& task);
+  void stop_after_error();
+  void stop();
   bool next_generation(Worker& worker);
   void choose_order(Worker& worker);
   void settle_order();
-  template <class Condition>
-  void wait(Lock& lock, Condition condition);
-  bool small() const;
+  void wait(Lock& lock);
+  bool tiny() const;
 
   System& system_;
   AtlasOptions options_;
@@ -100,7 +107,7 @@ class Atlas {
   std::vector<int> order_;  // slots in the order of the algorithm
 
   std::vector<int> generation_, turns_;  // slots of the charts to expand, and the order to take them in
-  std::vector<double> embeddings_;       // of the charts of a large generation
+  std::vector<double> embeddings_;       // of the charts of the generation
   std::size_t position_ = 0;             // in turns_
   std::size_t next_first_ = 0;           // in order_: where the next generation begins
   std::vector<int> again_;               // charts that made as many as one task may, or were opened again
@@ -110,8 +117,10 @@ class Atlas {
   std::mutex mutex_;
   std::condition_variable changed_, helpers_wanted_;
   std::int64_t chart_limit_ = 0, made_ = 0, promised_ = 0;  // charts that tasks have made, and may still make
-  int running_ = 0;
-  bool stop_ = false;
+  std::array<Task, kWindow> window_;                        // tasks that are running, or may be next
+  int admitted_ = 0;                                        // tasks in the window
+  bool stop_ = false;                                       // no more are admitted
+  std::atomic<std::int64_t> events_{0};                     // changes that a thread may wait for
   Clock::time_point deadline_;
 };
 
