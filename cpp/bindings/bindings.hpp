@@ -4,6 +4,8 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/typing.h>
 
+#include <vector>
+
 namespace graspatlas {
 
 using DoubleArray = pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast>;
@@ -13,7 +15,13 @@ using ArrayTable = pybind11::typing::Dict<pybind11::str, pybind11::array>;
 /// Pointer to the numbers of a one-dimensional array of this size; an Error that names it otherwise.
 const double* checked_vector(const DoubleArray& array, pybind11::ssize_t size, const char* name);
 
+template <class T>
+pybind11::array_t<T> matrix(pybind11::ssize_t rows, pybind11::ssize_t columns) {
+  return pybind11::array_t<T>(std::vector<pybind11::ssize_t>{rows, columns});
+}
+
 void bind_continuation(pybind11::module_& module);
+void bind_atlas(pybind11::module_& module);
 void bind_grasp(pybind11::module_& module);
 void bind_quality(pybind11::module_& module);
 

@@ -6,7 +6,9 @@
 #include <string>
 
 #include "bindings.hpp"
-#include "graspatlas/continuation/atlas.hpp"
+#include "graspatlas/continuation/neighbours.hpp"
+#include "graspatlas/continuation/newton.hpp"
+#include "graspatlas/continuation/polytope.hpp"
 #include "graspatlas/continuation/toy_systems.hpp"
 
 namespace py = pybind11;
@@ -78,122 +80,9 @@ class PythonSystem : public System, public py::trampoline_self_life_support {
   std::vector<Bound> bounds_;
 };
 
-template <class T>
-py::array_t<T> matrix(py::ssize_t rows, py::ssize_t columns) {
-  return py::array_t<T>(std::vector<py::ssize_t>{rows, columns});
-}
-
 py::array_t<double> copied(const double* data, py::ssize_t rows, py::ssize_t columns) {
   auto out = matrix<double>(rows, columns);
   std::copy_n(data, rows * columns, out.mutable_data());
-  return out;
-}
-
-/// The whole atlas as arrays; ragged parts (facets, vertices) as values and row offsets.
-ArrayTable atlas_arrays(const Atlas& atlas) {
-  const py::ssize_t n = atlas.count(), k = atlas.system().dimension(), v = atlas.system().tangent_size();
-  py::ssize_t facets = 0, vertices = 0, pair_count = 0;
-  for (py::ssize_t i = 0; i < n; ++i) {
-    const Polytope& p = atlas.chart(i).polytope;
-    for (int f = 0; f < p.facet_slots(); ++f) facets += p.facet_active(f);
-    vertices += p.vertex_count();
-    pair_count += atlas.chart(i).neighbour_count;
-  }
-  const py::ssize_t x_size = atlas.system().configuration_size();
-  auto centers = matrix<double>(n, x_size);
-  auto bases = py::array_t<double>(std::vector<py::ssize_t>{n, k, v});
-  auto residuals = py::array_t<double>(n);
-  auto facet_start = py::array_t<std::int64_t>(n + 1), vertex_start = py::array_t<std::int64_t>(n + 1);
-  auto normals = matrix<double>(facets, k), positions = matrix<double>(vertices, k);
-  auto offsets = py::array_t<double>(facets);
-  auto tags = py::array_t<std::int32_t>(facets);
-  auto closed = py::array_t<std::uint8_t>(vertices);
-  py::ssize_t f_at = 0, v_at = 0;
-  for (py::ssize_t i = 0; i < n; ++i) {
-    std::copy_n(atlas.center(i), x_size, centers.mutable_data(i, 0));
-    std::copy_n(atlas.basis(i), k * v, bases.mutable_data(i, 0, 0));
-    residuals.mutable_at(i) = atlas.chart(i).residual;
-    facet_start.mutable_at(i) = f_at;
-    vertex_start.mutable_at(i) = v_at;
-    const Polytope& p = atlas.chart(i).polytope;
-    for (int f = 0; f < p.facet_slots(); ++f) {
-      if (!p.facet_active(f)) continue;
-      std::copy_n(p.normal(f), k, normals.mutable_data(f_at, 0));
-      offsets.mutable_at(f_at) = p.offset(f);
-      tags.mutable_at(f_at++) = p.tag(f) >= 0 ? atlas.number(p.tag(f)) : p.tag(f);
-    }
-    for (int a = 0; a < p.vertex_count(); ++a) {
-      std::copy_n(p.vertex(a), k, positions.mutable_data(v_at, 0));
-      closed.mutable_at(v_at++) = p.state(a);
-    }
-  }
-  facet_start.mutable_at(n) = f_at;
-  vertex_start.mutable_at(n) = v_at;
-  auto pairs = matrix<std::int32_t>(pair_count, 2);
-  std::int32_t* pair = pairs.mutable_data();
-  for (py::ssize_t j = 0; j < n; ++j) {
-    const Chart& chart = atlas.chart(j);
-    for (int c = 0; c < chart.neighbour_count; ++c) {
-      *pair++ = atlas.number(chart.neighbours[c]);
-      *pair++ = static_cast<std::int32_t>(j);
-    }
-  }
-  ArrayTable out;
-  out["centers"] = centers;
-  out["bases"] = bases;
-  out["residuals"] = residuals;
-  out["facet_start"] = facet_start;
-  out["facet_normals"] = normals;
-  out["facet_offsets"] = offsets;
-  out["facet_tags"] = tags;
-  out["vertex_start"] = vertex_start;
-  out["vertices"] = positions;
-  out["vertex_closed"] = closed;
-  out["neighbour_pairs"] = pairs;
-  return out;
-}
-
-template <class T>
-void read_array(const ArrayTable& table, const char* name, std::vector<T>& out) {
-  if (!table.contains(name)) throw Error(std::string("the checkpoint lacks the array '") + name + "'");
-  const auto array = py::cast<py::array_t<T, py::array::c_style | py::array::forcecast>>(table[name]);
-  out.assign(array.data(), array.data() + array.size());
-}
-
-/// The parts of a checkpoint by name.
-template <class Table, class Visit>
-void visit_checkpoint(Table& table, const Visit& visit) {
-  visit("centers", table.centers);
-  visit("bases", table.bases);
-  visit("residuals", table.residuals);
-  visit("keys", table.keys);
-  visit("closed_charts", table.closed_charts);
-  visit("closed_vertices", table.closed_vertices);
-  visit("closed_reasons", table.closed_reasons);
-  visit("generation", table.generation);
-  visit("again", table.again);
-}
-
-Checkpoint read_checkpoint(const ArrayTable& table) {
-  Checkpoint out;
-  visit_checkpoint(out, [&table](const char* name, auto& part) { read_array(table, name, part); });
-  std::vector<std::int64_t> counts;
-  read_array(table, "counts", counts);
-  if (counts.size() != 3) throw Error("the checkpoint's counts must be three");
-  out.position = counts[0];
-  out.next_first = counts[1];
-  out.task_count = counts[2];
-  return out;
-}
-
-ArrayTable write_checkpoint(const Checkpoint& checkpoint) {
-  ArrayTable out;
-  visit_checkpoint(checkpoint, [&out](const char* name, const auto& part) {
-    out[name] = py::array_t<typename std::decay_t<decltype(part)>::value_type>(static_cast<py::ssize_t>(part.size()),
-                                                                               part.data());
-  });
-  const std::int64_t counts[] = {checkpoint.position, checkpoint.next_first, checkpoint.task_count};
-  out["counts"] = py::array_t<std::int64_t>(3, counts);
   return out;
 }
 
@@ -321,42 +210,6 @@ void bind_parts(py::module_& module) {
 void bind_continuation(py::module_& module) {
   bind_systems(module);
   bind_parts(module);
-  py::class_<Atlas>(module, "AtlasBuilder", "Grows an atlas chart by chart (Algorithm 1, lines 4 to 13).")
-      .def(py::init([](System& system, const DoubleArray& x0, double radius, double epsilon, int threads) {
-             AtlasOptions options;
-             options.radius = radius;
-             options.epsilon = epsilon;
-             return std::make_unique<Atlas>(system, checked_vector(x0, system.configuration_size(), "x0"), options,
-                                            threads);
-           }),
-           py::arg("system"), py::arg("x0"), py::arg("radius"), py::arg("epsilon"), py::arg("threads") = 1,
-           py::keep_alive<1, 2>())
-      .def_static(
-          "resume",
-          [](System& system, const ArrayTable& saved, double radius, double epsilon, int threads) {
-            AtlasOptions options;
-            options.radius = radius;
-            options.epsilon = epsilon;
-            const Checkpoint checkpoint = read_checkpoint(saved);
-            const py::gil_scoped_release release;
-            return std::make_unique<Atlas>(system, checkpoint, options, threads);
-          },
-          py::arg("system"), py::arg("saved"), py::arg("radius"), py::arg("epsilon"), py::arg("threads") = 1,
-          py::keep_alive<0, 1>(), "Goes on from what `save` returned, with all charts, to the same atlas.")
-      .def(
-          "save", [](const Atlas& atlas, std::int64_t first) { return write_checkpoint(atlas.save(first)); },
-          py::arg("first") = 0, "All that is needed to go on later, as arrays, with the charts from `first` on.")
-      .def("expand", &Atlas::expand, py::arg("chart_limit"), py::arg("seconds"),
-           py::call_guard<py::gil_scoped_release>(),
-           "Expand until complete, the limit of charts is reached, or the seconds have passed.")
-      .def_property_readonly("complete", &Atlas::complete, "True when no chart is left to expand.")
-      .def_property_readonly("n_open", &Atlas::open_count, "Charts still to be expanded.")
-      .def_property_readonly("n_charts", &Atlas::count, "Charts so far.")
-      .def_property_readonly("n_threads", &Atlas::threads, "Threads that it uses.")
-      .def_property_readonly("n_bytes", &Atlas::bytes, "Memory that it holds.")
-      .def_property_readonly("n_array_bytes", &Atlas::array_bytes, "Memory that its arrays would take, at most.")
-      .def_property_readonly("n_projections", &Atlas::projections, "Newton projections so far.")
-      .def("arrays", &atlas_arrays, "The atlas as a dictionary of arrays.");
   module.def(
       "project",
       [](System& system, const DoubleArray& x, const DoubleArray& Phi, const DoubleArray& u) {

@@ -21,6 +21,7 @@ PYBIND11_MODULE(_core, module) {
   module.doc() = "Compiled core of graspatlas: continuation, grasp systems and quality indices.";
   pybind11::register_exception<graspatlas::Error>(module, "GraspAtlasError", PyExc_ValueError);
   graspatlas::bind_continuation(module);
+  graspatlas::bind_atlas(module);
   graspatlas::bind_grasp(module);
   graspatlas::bind_quality(module);
 }
