@@ -2,8 +2,31 @@
 
 #include <cstdint>
 #include <functional>
+#include <thread>
 
 namespace graspatlas {
+
+/// What a thread does between two looks at something that mostly changes within a microsecond: at first nothing, after
+/// some looks it lets others run.
+class Patience {
+ public:
+  void wait() {
+    if (looks_++ < kShort)
+      pause();
+    else
+      std::this_thread::yield();
+  }
+
+ private:
+  static constexpr int kShort = 64;
+
+  static void pause() {
+#if defined(__x86_64__)
+    __builtin_ia32_pause();
+#endif
+  }
+  int looks_ = 0;
+};
 
 /// Cores that this process may use.
 int available_threads();

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
-#include <thread>
 
 #include "graspatlas/parallel.hpp"
 
@@ -130,7 +129,8 @@ void Atlas::work(Worker& worker) {
 void Atlas::wait(Lock& lock) {
   const std::int64_t seen = events_;
   lock.unlock();
-  for (int i = 0; i < kLooks && events_ == seen; ++i) std::this_thread::yield();
+  Patience patience;
+  for (int i = 0; i < kLooks && events_ == seen; ++i) patience.wait();
   lock.lock();
   changed_.wait(lock, [this, seen] { return events_ != seen; });
 }

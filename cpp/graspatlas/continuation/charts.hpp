@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <mutex>
 #include <shared_mutex>
-#include <thread>
 #include <vector>
 
 #include "graspatlas/continuation/neighbours.hpp"
@@ -11,6 +10,7 @@
 #include "graspatlas/continuation/polytope.hpp"
 #include "graspatlas/continuation/rows.hpp"
 #include "graspatlas/continuation/system.hpp"
+#include "graspatlas/parallel.hpp"
 
 namespace graspatlas {
 
@@ -63,14 +63,14 @@ class Charts {
 
   /// From now on `near` finds the chart, by its embedding.
   void publish(int slot, const double* embedding) {
-    while (!indexing_.try_lock()) std::this_thread::yield();
+    for (Patience patience; !indexing_.try_lock();) patience.wait();
     const std::lock_guard lock(indexing_, std::adopt_lock);
     index_.insert(embedding, slot);
   }
 
   /// Slots of the published charts within a distance, in no order.
   void near(const double* embedding, double distance, std::vector<int>& out, Neighbours::Scratch& scratch) const {
-    while (!indexing_.try_lock_shared()) std::this_thread::yield();
+    for (Patience patience; !indexing_.try_lock_shared();) patience.wait();
     const std::shared_lock lock(indexing_, std::adopt_lock);
     index_.within(embedding, distance, out, scratch);
   }

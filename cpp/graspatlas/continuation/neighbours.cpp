@@ -1,13 +1,12 @@
 #include "graspatlas/continuation/neighbours.hpp"
 
 #include <algorithm>
-#include <limits>
 
 namespace graspatlas {
 
 namespace {
 // A child that holds more than this share of its parent's points (and some more) makes the parent be rebuilt.
-constexpr double kLopsided = 0.7;
+constexpr double kLopsided = 0.85;
 }  // namespace
 
 Neighbours::Neighbours(int size) : size_(size), buckets_(kBucket * size) {}
@@ -81,7 +80,8 @@ int Neighbours::rebuild(int node, const double* point, int number) {
   collected_numbers_.push_back(number);
   collected_points_.insert(collected_points_.end(), point, point + size_);
   items_.resize(collected_numbers_.size());
-  for (std::size_t i = 0; i < items_.size(); ++i) items_[i] = {collected_numbers_[i], &collected_points_[i * size_]};
+  for (std::size_t i = 0; i < items_.size(); ++i)
+    items_[i] = {0.0, &collected_points_[i * size_], collected_numbers_[i]};
   return build(items_.data(), items_.data() + items_.size());
 }
 
@@ -101,6 +101,21 @@ void Neighbours::collect(int node) {
   free_nodes_.push_back(node);
 }
 
+int Neighbours::widest_axis(const Item* first, const Item* last) {
+  low_.assign(first->point, first->point + size_);
+  high_ = low_;
+  double *const low = low_.data(), *const high = high_.data();
+  for (const Item* item = first + 1; item != last; ++item)
+    for (int c = 0; c < size_; ++c) {
+      low[c] = std::min(low[c], item->point[c]);
+      high[c] = std::max(high[c], item->point[c]);
+    }
+  int axis = 0;
+  for (int c = 1; c < size_; ++c)
+    if (high[c] - low[c] > high[axis] - low[axis]) axis = c;
+  return axis;
+}
+
 int Neighbours::build(Item* first, Item* last) {
   const int node = new_node();
   const int count = static_cast<int>(last - first);
@@ -114,24 +129,11 @@ int Neighbours::build(Item* first, Item* last) {
     }
     return node;
   }
-  int axis = 0;
-  double widest = -1.0;
-  for (int c = 0; c < size_; ++c) {
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (Item* item = first; item != last; ++item) {
-      low = std::min(low, item->point[c]);
-      high = std::max(high, item->point[c]);
-    }
-    if (high - low > widest) {
-      widest = high - low;
-      axis = c;
-    }
-  }
+  const int axis = widest_axis(first, last);
+  for (Item* item = first; item != last; ++item) item->key = item->point[axis];
   Item* middle = first + count / 2;
-  std::nth_element(first, middle, last, [axis](const Item& a, const Item& b) {
-    return a.point[axis] < b.point[axis] || (a.point[axis] == b.point[axis] && a.number < b.number);
-  });
-  const double split = middle->point[axis];
+  std::nth_element(first, middle, last, [](const Item& a, const Item& b) { return a.key < b.key; });
+  const double split = middle->key;
   const int left = build(first, middle), right = build(middle, last);
   nodes_[node].axis = axis;
   nodes_[node].split = split;

@@ -54,14 +54,16 @@ class Neighbours {
     int count = 0;
   };
   struct Item {
-    int number;
+    double key;  // of the point, on the axis that is split
     const double* point;
+    int number;
   };
 
   double* bucket_point(int bucket, int i) { return buckets_[bucket] + static_cast<std::size_t>(i) * size_; }
   const double* bucket_point(int bucket, int i) const { return buckets_[bucket] + static_cast<std::size_t>(i) * size_; }
   int new_node();
   int new_bucket();
+  int widest_axis(const Item* first, const Item* last);
   int build(Item* first, Item* last);
   int rebuild(int node, const double* point, int number);
   void collect(int node);
@@ -75,7 +77,7 @@ class Neighbours {
   std::vector<int> free_nodes_, free_buckets_;
   // What a rebuild collects; kept, because leaves are split all the time.
   std::vector<int> collected_numbers_;
-  std::vector<double> collected_points_;
+  std::vector<double> collected_points_, low_, high_;
   std::vector<Item> items_;
 };
 
