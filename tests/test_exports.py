@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pinocchio as pin
 import pytest
-from helpers import BENT, tripod_problem
+from helpers import BENT, Written, tripod_problem
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
@@ -191,7 +191,9 @@ def test_angles_of_continuous_joints_come_back(planar: ga.Result, tmp_path: Path
 def test_sliding_joints_are_in_metres(tmp_path: Path) -> None:
     short = {name: value if name[1] != "0" else 0.01 * value for name, value in BENT.items()}
     problem = tripod_problem(short, kinds=["prismatic", "revolute", "revolute"])
-    ga.optimize(problem, dimension=6, radius=0.2, epsilon=0.5, quality="smallest_semi_axis", max_charts=3).save_grasps(tmp_path / "grasps.json")
+    ga.optimize(problem, dimension=6, radius=0.2, epsilon=0.5, quality="smallest_semi_axis", max_charts=3).save_grasps(
+        tmp_path / "grasps.json"
+    )
     units = json.loads((tmp_path / "grasps.json").read_text(encoding="utf-8"))["units"]["joints"]
     assert units == {name: "m" if name[1] == "0" else "rad" for name in BENT}
 
@@ -295,19 +297,30 @@ def test_table_of_charts(result: ga.Result) -> None:
     assert "volume" not in table
 
 
-def test_patch_parameters_are_those_of_the_contacts(result: ga.Result) -> None:
-    """The named parameters lead to the contact points on the object's patches."""
-    table = result.to_pandas()
-    chart = result.best.chart
+def test_patch_parameters_are_those_of_the_contacts() -> None:
+    """The named parameters lead to one point, on the hand's patch by Pinocchio and on the object's patch."""
+    rolling = tripod_problem(rolling=True)
+    problem = rolling.at(ga.project(rolling.full_system, rolling.x1_array + 1e-3 * np.arange(28)))
+    found = ga.optimize(problem, dimension=12, radius=0.3, epsilon=0.5, quality="smallest_semi_axis", max_charts=1)
+    table = found.to_pandas()
     named = [name for name in table if re.fullmatch(r"contact\d_(hand|object)_[uv]", name)]
-    assert len(named) == result.problem.full_system.n_parameters
-    for i, contact in enumerate(result.problem.contacts):
-        values = {
-            **contact.frozen,
-            **{p: table.loc[chart, f"contact{i}_object_{p}"] for p in "uv" if p not in contact.frozen},
-        }
-        point = contact.object.point(values["u"], values["v"])
-        assert_allclose(point, result.best.contact_points_in_object[i], atol=1e-10)
+    assert len(named) == problem.full_system.n_parameters == 12
+    grasp, row = found.at_x1, table.loc[0]
+    places = pinocchio_places(problem, dict(grasp.joint_positions))
+    for i, contact in enumerate(problem.contacts):
+        on_object = contact.object.point(row[f"contact{i}_object_u"], row[f"contact{i}_object_v"])
+        on_hand = contact.hand.point(row[f"contact{i}_hand_u"], row[f"contact{i}_hand_v"])
+        assert np.linalg.norm(on_hand) > 1e-4
+        assert_allclose(on_object, grasp.contact_points_in_object[i], atol=1e-10)
+        assert_allclose((grasp.palm_pose * places[contact.frame]).act(on_hand), on_object, atol=1e-10)
+
+
+def test_closed_vertices_are_counted_where_they_are() -> None:
+    system = Written(3, 1, lambda x: [x @ x - 1.0 if x[2] > 0 else np.nan], lambda x: [2.0 * x])
+    atlas = ga.build_atlas(system, [0, 0, 1], radius=0.1, epsilon=0.1)
+    table = atlas.to_pandas()
+    assert table["closed_not_converged"].sum() == atlas.closed_vertices["not_converged"] > 10
+    assert (table["x2"][table["closed_not_converged"] > 0] < 0.2).all()
 
 
 def test_table_of_any_atlas(sphere: ga.Atlas) -> None:
