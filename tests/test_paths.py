@@ -238,7 +238,7 @@ def test_a_joint_trajectory(path: ga.GraspPath, tmp_path: Path) -> None:
 
 def test_a_path_without_grasps_is_a_table_too(sphere: ga.Atlas, tmp_path: Path) -> None:
     ga.shortest_path(sphere, 0, 9).save_csv(tmp_path / "path.csv")
-    assert (tmp_path / "path.csv").read_text(encoding="utf-8").startswith("arc_length,x0,x1,x2\n0,")
+    assert (tmp_path / "path.csv").read_text(encoding="utf-8").startswith("arc_length,x0,x1,x2\n0.0,")
 
 
 def test_ends_may_be_grasps(held: ga.Result, path: ga.GraspPath) -> None:

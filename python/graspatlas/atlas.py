@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from enum import Enum
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,9 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.projection import checked_point
 from graspatlas.systems import AnySystem
 from graspatlas.tables import number_array
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 __all__ = ["BOX_TAG", "Atlas", "Closed", "Status"]
 
@@ -309,6 +312,35 @@ class Atlas:
     def _orientation(self, i: int, j: int) -> int:
         """1 when the tangent bases of two charts have the same orientation, else -1."""
         return 1 if np.linalg.det(self.bases[i] @ self.bases[j].T) > 0.0 else -1
+
+    def to_pandas(self, *, volumes: bool = False) -> DataFrame:
+        """The charts as a table, one row a chart: centre, residual, neighbours, facets and closed vertices.
+
+        Columns are ``x0``, ``x1`` and so on, the numbers of the centre; ``residual``, the largest entry of |R(x)|;
+        ``n_neighbours``; ``n_facets``; ``n_vertices``; and how many vertices were not expanded, by reason:
+        ``closed_bounds``, ``closed_curvature``, ``closed_not_converged``.
+
+        Args:
+            volumes: Add ``volume``, that of each chart's polytope; slow in high dimensions.
+
+        Raises:
+            GraspAtlasError: If pandas is not installed.
+        """
+        from graspatlas.data_frames import atlas_frame  # pandas is slow to import
+
+        return atlas_frame(self, volumes)
+
+    def neighbours_to_pandas(self) -> DataFrame:
+        """Pairs of neighbouring charts as a table: ``chart``, ``neighbour`` and ``distance``, each pair once.
+
+        The distance of the centres is in units of the tangent space.
+
+        Raises:
+            GraspAtlasError: If pandas is not installed.
+        """
+        from graspatlas.data_frames import neighbour_frame  # pandas is slow to import
+
+        return neighbour_frame(self)
 
     def to_arrays(self) -> dict[str, Any]:
         """All arrays by name, for storing."""

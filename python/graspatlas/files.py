@@ -1,17 +1,21 @@
-"""Files that are either written completely or not at all."""
+"""Files that are either written completely or not at all, and tables in them."""
 
 from __future__ import annotations
 
+import csv
+import io
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
+
+import numpy as np
 
 from graspatlas.errors import GraspAtlasError
 
-__all__ = ["replaced"]
+__all__ = ["replaced", "write_csv"]
 
 
 @contextmanager
@@ -41,6 +45,34 @@ def replaced(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     finally:
         if os.path.exists(temporary):
             os.unlink(temporary)
+
+
+def write_csv(path: str | os.PathLike[str], columns: Mapping[str, Iterable[Any]]) -> None:
+    """Write a table as CSV: a row of names, then one row an entry; UTF-8, commas, a dot in numbers.
+
+    Numbers have as many digits as it takes to read the same ones back; flags are ``true`` and ``false``, and a NaN
+    leaves its cell empty.
+
+    Args:
+        path: Such as ``"path.csv"``; an existing file is replaced.
+        columns: Columns of one length, by name.
+
+    Raises:
+        GraspAtlasError: If the file cannot be written.
+    """
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(columns)
+    plain = [column.tolist() if isinstance(column, np.ndarray) else column for column in columns.values()]
+    table.writerows([_cell(value) for value in row] for row in zip(*plain, strict=True))
+    with replaced(path) as stream:
+        stream.write(text.getvalue().encode("utf-8"))
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return "" if value != value else value
 
 
 def _unwritable(target: Path, error: OSError) -> GraspAtlasError:

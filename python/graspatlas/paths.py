@@ -13,8 +13,6 @@ Charts that neighbour each other make a graph; its shortest path is bridged on t
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 import sys
 from dataclasses import dataclass
@@ -27,17 +25,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
-from scipy.spatial.transform import Rotation
 
 from graspatlas.atlas import Atlas
 from graspatlas.errors import GraspAtlasError
-from graspatlas.files import replaced
+from graspatlas.files import write_csv
 from graspatlas.grasps import Grasp, Grasps
 from graspatlas.quality import INDICES, evaluate
 from graspatlas.requirements import requirement_name, screen
 from graspatlas.result import Result
 from graspatlas.shortening import BOUND_TOLERANCE, Allowed, arc_lengths, bridge, evenly, shorten
-from graspatlas.tables import number_array
+from graspatlas.tables import joined, number_array, pose_columns
+from graspatlas.timing import URDF, passing_times
 
 __all__ = ["GraspPath", "Path", "shortest_path"]
 
@@ -104,13 +102,7 @@ class Path:
         Raises:
             GraspAtlasError: If the file cannot be written.
         """
-        columns = self._columns()
-        text = io.StringIO()
-        table = csv.writer(text, lineterminator="\n")
-        table.writerow(columns)
-        table.writerows([f"{value:.12g}" for value in row] for row in zip(*columns.values(), strict=True))
-        with replaced(path) as stream:
-            stream.write(text.getvalue().encode("utf-8"))
+        write_csv(path, self._columns())
 
     def _columns(self) -> dict[str, Array]:
         """Columns of the table by name, each [n]."""
@@ -160,35 +152,51 @@ class GraspPath(Path):
         """False when a requirement was a callable that was lost when the result was stored."""
         return not any(isinstance(requirement, str) for requirement in self.result.requirements)
 
-    def save_csv(self, path: str | os.PathLike[str]) -> None:
+    @cached_property
+    def joint_positions(self) -> dict[str, Array]:
+        """Joint positions by name, [n] each [rad or m]; none jumps, so a continuous joint may leave [-pi, pi]."""
+        hand, positions = self.result.problem.hand, self.grasps.joint_positions
+        turning = {joint.name for joint in hand.model.hand_joints if joint.q_size == 2}
+        return {name: np.unwrap(values) if name in turning else values for name, values in positions.items()}
+
+    def times(self, joint_speed: float | str = URDF) -> Array:
+        """When each point is passed, no joint faster than it may be [n], seconds; accelerations are not limited.
+
+        Args:
+            joint_speed: Largest speed of every joint [rad/s or m/s], or ``"urdf"`` for the velocity limits of the
+                hand's URDF, which also hold when a larger number is given. Every step takes a microsecond at least.
+
+        Raises:
+            GraspAtlasError: If `joint_speed` is neither, or the URDF states no limit for a joint and is to be followed.
+        """
+        return passing_times(self.result.problem.hand, self.joint_positions, joint_speed)
+
+    def save_csv(self, path: str | os.PathLike[str], *, joint_speed: float | str | None = None) -> None:
         """Write the path as a joint trajectory, one row a point.
 
         The columns are ``arc_length`` [units of the tangent space], the hand's joints by name [rad or m], the pose of
         the object in the palm's frame, ``object_x``, ``object_y``, ``object_z`` [m], ``object_qx``, ``object_qy``,
         ``object_qz``, ``object_qw`` (unit quaternion), and ``quality``, which is left out where the index was lost.
-        No column jumps: a continuous joint may leave [-pi, pi], and the quaternion does not change its sign.
+        ``time`` [s] comes first when a joint speed is given; see :meth:`times`. No column jumps: a continuous joint may
+        leave [-pi, pi], and the quaternion does not change its sign.
 
         Args:
             path: Such as ``"path.csv"``; an existing file is replaced.
+            joint_speed: Largest speed of every joint [rad/s or m/s], or ``"urdf"``; without it there are no times.
 
         Raises:
-            GraspAtlasError: If the file cannot be written.
+            GraspAtlasError: If the file cannot be written, `joint_speed` makes no sense, or a joint has the name of
+                another column.
         """
-        super().save_csv(path)
+        timed = {} if joint_speed is None else {"time": self.times(joint_speed)}
+        write_csv(path, joined(timed, self._columns()))
 
     def _columns(self) -> dict[str, Array]:
-        positions = [self.result.problem.hand.joint_positions(q) for q in self.grasps.q]
-        columns = {"arc_length": self.arc_length}
-        for joint in self.result.problem.hand.model.hand_joints:
-            angles = np.array([row[joint.name] for row in positions])
-            columns[joint.name] = np.unwrap(angles) if joint.q_size == 2 else angles
-        poses = self.grasps.T_palm_object
-        quaternions = _steady(Rotation.from_matrix(poses[:, :3, :3]).as_quat())
-        columns |= {f"object_{axis}": poses[:, i, 3] for i, axis in enumerate("xyz")}
-        columns |= {f"object_q{axis}": quaternions[:, i] for i, axis in enumerate("xyzw")}
+        quaternions = _steady(self.grasps.object_quat_xyzw)
+        rest = pose_columns("object", self.grasps.object_xyz, quaternions)
         if self.knows_quality:
-            columns["quality"] = self.qualities
-        return columns
+            rest["quality"] = self.qualities
+        return joined({"arc_length": self.arc_length}, self.joint_positions, rest)
 
 
 def _steady(quaternions: Array) -> Array:

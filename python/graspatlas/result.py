@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,16 @@ from numpy.typing import NDArray
 from graspatlas.atlas import Atlas, Status
 from graspatlas.checks import CheckReport, check_result
 from graspatlas.errors import GraspAtlasError
+from graspatlas.exports import save_grasps
 from graspatlas.grasps import Grasp, Grasps
 from graspatlas.problem import Problem
 from graspatlas.quality import Quality, evaluate, quality_name
 from graspatlas.refinement import Refinement
 from graspatlas.requirements import Require, parse_requirement, requirement_name
 from graspatlas.tables import number
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 __all__ = ["Result", "load_result", "writable_folder"]
 
@@ -89,7 +93,7 @@ class Result:
         Raises:
             GraspAtlasError: If no grasp meets them.
         """
-        candidates = self._candidates()
+        candidates = self.candidates()
         return self.grasp(int(candidates[np.argmax(self.qualities[candidates])]))
 
     @cached_property
@@ -99,11 +103,15 @@ class Result:
         Raises:
             GraspAtlasError: If no grasp meets them.
         """
-        candidates = self._candidates()
+        candidates = self.candidates()
         return self.grasp(int(candidates[np.argmin(self.qualities[candidates])]))
 
-    def _candidates(self) -> NDArray[np.intp]:
-        """Charts that meet the requirements; at least one."""
+    def candidates(self) -> NDArray[np.intp]:
+        """Charts that meet the requirements, ascending; at least one.
+
+        Raises:
+            GraspAtlasError: If no grasp meets them.
+        """
         if not self.feasible.any():
             counts = ", ".join(f"{name} refused {count}" for name, count in self.refused.items())
             raise GraspAtlasError(f"none of {self.atlas.n_charts} grasps meets the requirements ({counts}): relax one")
@@ -169,13 +177,67 @@ class Result:
         Raises:
             GraspAtlasError: If there is no such chart.
         """
+        one = Grasps(self.problem, self.atlas.centers[self.checked_chart(chart)])[0]
+        return replace(one, quality=float(self.qualities[chart]), chart=chart)
+
+    def checked_chart(self, chart: int) -> int:
+        """The number of a chart that exists.
+
+        Raises:
+            GraspAtlasError: If there is no such chart.
+        """
         whole = isinstance(chart, int | np.integer) and not isinstance(chart, bool)
         if not whole or not 0 <= chart < self.atlas.n_charts:
             raise GraspAtlasError(
                 f"chart {chart!r} does not exist; the atlas has charts 0 to {self.atlas.n_charts - 1}"
             )
-        one = Grasps(self.problem, self.atlas.centers[chart])[0]
-        return replace(one, quality=float(self.qualities[chart]), chart=chart)
+        return int(chart)
+
+    def save_grasps(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        charts: Sequence[int] | None = None,
+        best: int | None = None,
+        feasible: bool = False,
+        refined: bool = False,
+    ) -> int:
+        """Write grasps for other programs: joints by name, poses of palm and object, contacts, values of the indices.
+
+        All charts in their order by default. The fields and columns are listed in docs/results.md. Lengths are in
+        metres, angles in radians, quaternions x y z w; numbers have all digits.
+
+        Args:
+            path: Ends in ``.json``, one object with the names of frames and units, or ``.csv``, one row a grasp; an
+                existing file is replaced at once or not.
+            charts: Only these, in this order.
+            best: Only so many, the best that meet the requirements, the best first.
+            feasible: Only those that meet the requirements.
+            refined: Put the refined best before the others.
+
+        Returns:
+            How many grasps were written.
+
+        Raises:
+            GraspAtlasError: If the file has another ending or cannot be written, there is no such chart, no grasp meets
+                the requirements where some must, or `refined` was asked for and the result was not refined.
+        """
+        return save_grasps(self, path, charts=charts, best=best, feasible=feasible, refined=refined)
+
+    def to_pandas(self, *, volumes: bool = False) -> DataFrame:
+        """The atlas as a table, one row a chart: indices, joints, poses and what :meth:`Atlas.to_pandas` tells.
+
+        Joints stand by their names [rad or m], the free patch parameters as ``contact0_hand_u`` and so on.
+
+        Args:
+            volumes: Add the volume of each chart's polytope; slow in high dimensions.
+
+        Raises:
+            GraspAtlasError: If pandas is not installed, or two columns have one name.
+        """
+        from graspatlas.data_frames import result_frame  # pandas is slow to import
+
+        return result_frame(self, volumes)
 
     def check(self) -> CheckReport:
         """Verify every chart again, from the problem alone; see :func:`graspatlas.checks.check_result`."""

@@ -1,4 +1,4 @@
-"""The commands about results: graspatlas view, pareto, densify, path and check-result."""
+"""The commands about results: graspatlas view, export, pareto, densify, path and check-result."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from graspatlas.data_frames import FRAME_ENDINGS, save_frame
 from graspatlas.errors import GraspAtlasError
 from graspatlas.exit_status import FAILED, INTERRUPTED
 from graspatlas.files import replaced
@@ -18,18 +19,30 @@ from graspatlas.paths import GraspPath, shortest_path
 from graspatlas.quality import quality_name
 from graspatlas.result import Result, load_result, writable_folder
 from graspatlas.sampling import Samples, densify
+from graspatlas.timing import speed_limits
 
 __all__ = ["add_result_commands"]
 
 
 def add_result_commands(commands: Any) -> None:
-    """Add view, pareto, densify, path and check-result to the subcommands of a parser."""
+    """Add view, export, pareto, densify, path and check-result to the subcommands of a parser."""
     look = commands.add_parser("view", help="show the best and the worst grasp of a result")
     look.add_argument("result", type=Path, help="folder or file that optimize wrote")
     look.add_argument("--html", type=Path, metavar="FILE", help="write a page that needs no server instead")
     look.add_argument("--picture", type=Path, metavar="FILE", help="write a PNG picture instead")
     look.add_argument("--no-browser", action="store_true", help="do not open a browser, only say where to look")
     look.set_defaults(run=_view)
+
+    out = commands.add_parser("export", help="write grasps of a result for other programs, or its charts as a table")
+    out.add_argument("result", type=Path, help="folder or file that optimize wrote")
+    out.add_argument("--grasps", type=Path, metavar="FILE", help="write joints, poses and contacts (.json or .csv)")
+    out.add_argument("--best", type=int, metavar="N", help="only the N best grasps that meet the requirements")
+    out.add_argument("--chart", nargs="+", metavar="CHART", help="only these: numbers of charts, first, best or worst")
+    out.add_argument("--feasible", action="store_true", help="only grasps that meet the result's requirements")
+    out.add_argument("--refined", action="store_true", help="put the refined best before the others")
+    out.add_argument("--table", type=Path, metavar="FILE", help="write the table of charts (.csv or .parquet)")
+    out.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    out.set_defaults(run=_export)
 
     front = commands.add_parser("pareto", help="list the grasps that no other beats in two indices")
     front.add_argument("result", type=Path, help="folder or file that optimize wrote")
@@ -55,6 +68,8 @@ def add_result_commands(commands: Any) -> None:
     way.add_argument("--to", dest="end", default="best", metavar="CHART", help=f"{where}; best by default")
     way.add_argument("--feasible", action="store_true", help="only through grasps that meet the result's requirements")
     way.add_argument("--csv", type=Path, metavar="FILE", help="write a table: joints, pose of the object, quality")
+    speed = "add times to the table: no joint faster than S [rad/s or m/s], or than the URDF's limits with 'urdf'"
+    way.add_argument("--joint-speed", metavar="S", help=speed)
     way.add_argument("--html", type=Path, metavar="FILE", help="write a page with a slider that needs no server")
     way.add_argument("--picture", type=Path, metavar="FILE", help="write a PNG picture of six grasps on the way")
     way.set_defaults(run=_path)
@@ -76,6 +91,34 @@ def _view(options: argparse.Namespace) -> int:
         print(f"wrote {options.picture}", file=sys.stderr)
     if not options.html and not options.picture:
         view(result, open_browser=not options.no_browser)
+    return 0
+
+
+def _export(options: argparse.Namespace) -> int:
+    if not options.grasps and not options.table:
+        raise GraspAtlasError("nothing to write: give --grasps FILE or --table FILE")
+    if options.table and options.table.suffix not in FRAME_ENDINGS:
+        raise GraspAtlasError(f"table '{options.table}' must end in {' or '.join(FRAME_ENDINGS)}")
+    result = load_result(options.result)
+    if (options.best is not None or options.feasible) and not result.feasible.any():
+        print(f"{result.problem.name}: no grasp meets the requirements, nothing was written", file=sys.stderr)
+        return FAILED
+    summary: dict[str, Any] = {"problem": result.problem.name, "n_charts": result.atlas.n_charts}
+    if options.grasps:
+        charts = options.chart and [_chart(result, name) for name in options.chart]
+        chosen = {name: getattr(options, name) for name in ("best", "feasible", "refined")}
+        count = result.save_grasps(options.grasps, charts=charts, **chosen)
+        summary |= {"n_grasps": count, "grasps": str(options.grasps)}
+    if options.table:
+        save_frame(result.to_pandas(), options.table)
+        summary["table"] = str(options.table)
+    if options.json:
+        print(json.dumps(summary))
+        return 0
+    if options.grasps:
+        print(f"{result.problem.name}: {count} of {result.atlas.n_charts} grasps written to {options.grasps}")
+    if options.table:
+        print(f"{result.problem.name}: {result.atlas.n_charts} charts written to {options.table}")
     return 0
 
 
@@ -149,7 +192,12 @@ def _sample_lines(result: Result, samples: Samples, folder: Path) -> list[str]:
 
 
 def _path(options: argparse.Namespace) -> int:
+    speed = _joint_speed(options.joint_speed)
+    if speed is not None and not options.csv:
+        raise GraspAtlasError("--joint-speed is for the table: give --csv FILE too")
     result = load_result(options.result)
+    if speed is not None:
+        speed_limits(result.problem.hand, speed)
     start, end = (_chart(result, name) for name in (options.start, options.end))
     path = shortest_path(result, start, end, feasible=options.feasible, progress=True)
     print(
@@ -165,12 +213,23 @@ def _path(options: argparse.Namespace) -> int:
         print(f"  {path.feasible.sum()} of {len(path)} points meet the requirements")
     from graspatlas.viewer import export_html, save_picture
 
-    writers = ((options.csv, GraspPath.save_csv), (options.html, export_html), (options.picture, save_picture))
+    def save_csv(path: GraspPath, file: Path) -> None:
+        path.save_csv(file, joint_speed=speed)
+
+    writers = ((options.csv, save_csv), (options.html, export_html), (options.picture, save_picture))
     for file, write in writers:
         if file:
             write(path, file)
             print(f"wrote {file}", file=sys.stderr)
     return 0
+
+
+def _joint_speed(text: str | None) -> float | str | None:
+    """The speed that a word states; what is neither a number nor 'urdf' is refused later."""
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        return text
 
 
 def _chart(result: Result, name: str) -> int:

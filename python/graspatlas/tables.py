@@ -1,4 +1,4 @@
-"""Plain data from files, checked: tables with known keys, numbers where numbers belong."""
+"""Plain data from files, checked: tables with known keys, numbers where numbers belong; and columns of tables."""
 
 from __future__ import annotations
 
@@ -11,7 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 
-__all__ = ["checked_instance", "checked_table", "number", "number_array", "numbers", "shown"]
+__all__ = [
+    "checked_instance",
+    "checked_table",
+    "joined",
+    "number",
+    "number_array",
+    "numbers",
+    "pose_columns",
+    "shown",
+]
 
 
 def checked_instance(value: Any, kind: type | tuple[type, ...], what: str, hint: str = "") -> None:
@@ -99,3 +108,30 @@ def number_array(value: ArrayLike, what: str) -> NDArray[np.float64]:
         return np.asarray(value, float)
     except (TypeError, ValueError, OverflowError):
         raise GraspAtlasError(f"{what} must be an array of numbers, got {shown(value)}") from None
+
+
+def joined(*tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Columns of several tables side by side.
+
+    Raises:
+        GraspAtlasError: If two have one name, as a joint called ``quality`` would.
+    """
+    columns: dict[str, Any] = {}
+    for table in tables:
+        for name in table:
+            if name in columns:
+                raise GraspAtlasError(f"two columns of the table would be called '{name}'; rename the joint or index")
+        columns |= table
+    return columns
+
+
+def pose_columns(name: str, xyz: NDArray[np.float64], quat_xyzw: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """Columns of poses: ``<name>_x``, ``_y``, ``_z`` and ``<name>_qx``, ``_qy``, ``_qz``, ``_qw``.
+
+    Args:
+        name: What has the poses.
+        xyz: Positions [n, 3], metres.
+        quat_xyzw: Unit quaternions [n, 4].
+    """
+    places = {f"{name}_{axis}": xyz[:, i] for i, axis in enumerate("xyz")}
+    return {**places, **{f"{name}_q{axis}": quat_xyzw[:, i] for i, axis in enumerate("xyzw")}}

@@ -12,7 +12,17 @@ from scipy.spatial.transform import Rotation
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 
-__all__ = ["box_urdf", "cylinder_urdf", "joint_limits", "lock_joints", "mesh_urdf", "moving_joints", "sphere_urdf"]
+__all__ = [
+    "box_urdf",
+    "cylinder_urdf",
+    "joint_limits",
+    "lock_joints",
+    "mesh_urdf",
+    "moving_joints",
+    "root_link",
+    "sphere_urdf",
+    "velocity_limits",
+]
 
 Array = NDArray[np.float64]
 #: Joints that move with one degree of freedom.
@@ -40,6 +50,32 @@ def joint_limits(urdf: str) -> dict[str, tuple[float, float]]:
         if joint.get("type") == "revolute" and limit is not None:
             limits[str(joint.get("name"))] = (float(limit.get("lower", "0")), float(limit.get("upper", "0")))
     return limits
+
+
+def velocity_limits(urdf: str) -> dict[str, float]:
+    """Velocity limits of the moving joints of a URDF that state a positive one [rad/s or m/s], by name.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    limits = {}
+    for joint in _joints(ElementTree.fromstring(urdf)):
+        limit = joint.find("limit")
+        velocity = 0.0 if limit is None else float(limit.get("velocity", "0"))
+        if velocity > 0.0:
+            limits[str(joint.get("name"))] = velocity
+    return limits
+
+
+def root_link(urdf: str) -> str:
+    """Name of the link of a URDF that is no joint's child; of the first where there are several.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    root = ElementTree.fromstring(urdf)
+    children = {str(child.get("link")) for joint in root.findall("joint") for child in joint.findall("child")}
+    return next((name for link in root.findall("link") if (name := str(link.get("name"))) not in children), "")
 
 
 def lock_joints(urdf: str, positions: Mapping[str, float]) -> str:
