@@ -131,8 +131,8 @@ def test_collisions_at_x1_are_named(can):
 
 def test_neighbouring_links_may_touch_without_an_srdf():
     """All pairs of one joint, and of parent and child, are left out, and no other."""
-    hand = ga.load_problem("allegro_cylinder").hand
-    problem = replace(ga.load_problem("allegro_cylinder"), hand=replace(hand, srdf=""))
+    hand = ga.load_problem("allegro_cylinder_3").hand
+    problem = replace(ga.load_problem("allegro_cylinder_3"), hand=replace(hand, srdf=""))
     checker = CollisionChecker(problem)
     model, geometry = checker._model, checker._geometry
     hand_pairs = 0
@@ -291,7 +291,7 @@ def test_schema(tmp_path, capsys):
 
 
 def test_require_none_drops_the_requirements_of_the_file(tmp_path: Path, capsys):
-    words = ["optimize", "allegro_cylinder", "--radius", "0.4", "--output", str(tmp_path / "out")]
+    words = ["optimize", "allegro_cylinder_3", "--radius", "0.4", "--output", str(tmp_path / "out")]
     assert main(words) == 0
     assert "meet the requirements" in capsys.readouterr().out
     assert main([*words, "--require", "none"]) == 0

@@ -22,7 +22,7 @@ from graspatlas.requirements import requirement_from_dict
 from graspatlas.robot_files import described_robot, example_robot
 
 CAN, _, ROBOTS = problem_text("schunk_can")
-ALLEGRO = problem_text("allegro_cylinder")[0]
+ALLEGRO = problem_text("allegro_cylinder_3")[0]
 
 
 def read(text: str) -> ga.Problem:
@@ -580,7 +580,7 @@ def test_postures_that_would_run_code_are_refused(tmp_path):
 
 
 def test_couplings_hold_in_every_grasp():
-    problem = ga.load_problem("allegro_cylinder")
+    problem = ga.load_problem("allegro_cylinder_3")
     assert problem.frozen_motions(2) == len(problem.motions.couplings) == 5
     atlas = ga.optimize(problem, radius=0.3, require=()).atlas
     q = [dict(zip(problem.hand.joints, row, strict=True)) for row in atlas.centers[:, : len(problem.hand.joints)]]
@@ -621,7 +621,7 @@ def test_couplings_come_before_postures():
 
 
 def test_the_files_requirements_are_the_default():
-    problem = ga.load_problem("allegro_cylinder")
+    problem = ga.load_problem("allegro_cylinder_3")
     assert [str(r) for r in problem.requirements] == ["force_closure:0.5:0.02", "collision_free:0.002:0"]
     result = ga.optimize(problem, radius=0.4)
     assert result.requirements == problem.requirements
@@ -640,7 +640,7 @@ def test_requirements_that_are_none(data):
 
 def test_the_name_is_the_files_by_default(tmp_path):
     (tmp_path / "my_problem.yml").write_text(
-        ALLEGRO.replace("name: allegro_cylinder\n", "").replace("allegro/", f"{ROBOTS}/allegro/")
+        ALLEGRO.replace("name: allegro_cylinder_3\n", "").replace("allegro/", f"{ROBOTS}/allegro/")
     )
     assert ga.load_problem(tmp_path / "my_problem.yml").name == "my_problem"
 

@@ -16,8 +16,9 @@ from screens import pixels, share
 
 import graspatlas as ga
 from graspatlas.viewer import bodies, ellipsoid, export_html, meshes, save_picture, sketch
+from graspatlas.viewer.picture import WINDOW
 from graspatlas.viewer.raster import nearest
-from graspatlas.viewer.scene import CONTACT_RADIUS, Scene
+from graspatlas.viewer.scene import CONTACT_RADIUS, Scene, vertices_of
 from graspatlas.viewer.shading import to_linear, to_screen
 
 Array = NDArray[np.float64]
@@ -334,6 +335,28 @@ def test_picture_shows_hand_and_object_on_both_sides(picture: Array) -> None:
 def test_picture_shows_the_can(can_result: ga.Result, tmp_path: Path) -> None:
     save_picture(can_result, tmp_path / "can.png", width=480, height=270)
     assert share(pixels(tmp_path / "can.png"), "blue") > 0.0005
+
+
+@pytest.mark.parametrize(("wide", "high"), [(480, 360), (800, 300), (400, 600)])
+def test_picture_of_the_best_grasp_alone(bottle_result: ga.Result, tmp_path: Path, wide: int, high: int) -> None:
+    save_picture(bottle_result, tmp_path / "best.png", width=wide, height=high, worst=False)
+    seen = pixels(tmp_path / "best.png")
+    assert seen.shape == (high, wide, 3)
+    middle = seen[:, wide // 4 : -wide // 4]
+    assert share(middle, "yellow") > 0.01
+    assert share(middle, "grey") > 0.01
+
+
+@pytest.mark.parametrize("worst", [False, True])
+def test_normals_are_in_the_picture(worst: bool) -> None:
+    """Those of a box's faces stick out beyond hand and object."""
+    scene = Scene(ga.optimize(ga.load_problem("allegro_box_4"), radius=0.3), worst=worst)
+    assert [exhibit.name for exhibit in scene.exhibits] == ["best", "worst"][: 1 + worst]
+    camera = scene.camera(4.0 / 3.0, WINDOW)
+    low, high = np.array([WINDOW[0], WINDOW[2]]), np.array([WINDOW[1], WINDOW[3]])
+    for exhibit in scene.exhibits:
+        seen = camera.project(vertices_of(list(exhibit.parts), ("normal",)), 4.0 / 3.0)[:, :2]
+        assert ((seen > low - 1e-6) & (seen < high + 1e-6)).all()
 
 
 def test_picture_has_the_size_asked_for(can_result: ga.Result, tmp_path: Path) -> None:

@@ -64,7 +64,14 @@ def export_html(shown: Result | Path, path: str | os.PathLike[str]) -> None:
         stream.write(text.encode("utf-8"))
 
 
-def save_picture(shown: Result | Path, path: str | os.PathLike[str], *, width: int = 1600, height: int = 900) -> None:
+def save_picture(
+    shown: Result | Path,
+    path: str | os.PathLike[str],
+    *,
+    width: int = 1600,
+    height: int = 900,
+    worst: bool = True,
+) -> None:
     """Write a picture of the best and the worst grasp, or six grasps of a path, as a PNG file.
 
     It needs neither browser nor graphics card.
@@ -74,6 +81,7 @@ def save_picture(shown: Result | Path, path: str | os.PathLike[str], *, width: i
         path: Such as ``"can.png"``; an existing file is replaced.
         width: Width in pixels, at least 320.
         height: Height in pixels, at least 180.
+        worst: Whether the worst grasp stands beside the best; a path's picture has neither.
 
     Raises:
         GraspAtlasError: If the size is too small, a mesh cannot be read or the file cannot be written.
@@ -92,7 +100,7 @@ def save_picture(shown: Result | Path, path: str | os.PathLike[str], *, width: i
         if isinstance(shown, Path):
             image = draw_strip(Film(shown, FRAMES), width, height)
         else:
-            image = draw(Scene(shown), width, height)
+            image = draw(Scene(shown, worst=worst), width, height)
         image.save(stream, "PNG")
 
 

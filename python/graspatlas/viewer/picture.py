@@ -1,4 +1,4 @@
-"""A picture of the best and the worst grasp, drawn without browser, graphics card or display."""
+"""A picture of the best grasp, or of the best and the worst, drawn without browser, graphics card or display."""
 
 from __future__ import annotations
 
@@ -25,6 +25,8 @@ FloatArray = NDArray[np.float32]
 MIN_WIDTH, MIN_HEIGHT = 320, 180
 #: Largest side of a picture [pixels]: each takes a kilobyte while it is drawn.
 MAX_SIDE = 8192
+#: Widths of the legend and of a caption, as multiples of the height of the caption's title, with room beside them.
+LEGEND_LETTERS, CAPTION_LETTERS = 32.0, 20.0
 #: Each pixel is the mean of this many by this many.
 SAMPLES = 2
 #: The background is computed for one in so many samples each way.
@@ -72,11 +74,11 @@ def painted(parts: list[Part], camera: Camera, width: int, height: int) -> Image
 def _write(image: Image.Image, scene: Scene, camera: Camera) -> None:
     """Put captions under the grasps, the legend at the foot and the subtitle at the head."""
     width, height = image.size
-    size = min(height / 22.0, width / 40.0)
+    size = min(height / 22.0, width / max(LEGEND_LETTERS, CAPTION_LETTERS * len(scene.exhibits)))
     words = [caption(scene.result, exhibit) for exhibit in scene.exhibits]
     seen = [camera.project(exhibit.points, width / height)[:, 0] for exhibit in scene.exhibits]
     middles = [width * float(x.min() + x.max() + 2.0) / 4.0 for x in seen]
-    room = min(middles[1] - middles[0], 2.0 * middles[0], 2.0 * (width - middles[1])) - size
+    room = min([*np.diff(middles), 2.0 * middles[0], 2.0 * (width - middles[-1])]) - size
     widest = max(caption_image(w, size).width for w in words)
     for middle, w in zip(middles, words, strict=True):
         text = caption_image(w, size * min(1.0, room / widest))

@@ -1,4 +1,4 @@
-"""What the viewers show: the best and the worst grasp side by side, as coloured meshes, and where to look from."""
+"""What the viewers show: the best grasp, the worst beside it, as coloured meshes, and where to look from."""
 
 from __future__ import annotations
 
@@ -96,8 +96,8 @@ class Exhibit:
 
     @cached_property
     def points(self) -> Array:
-        """Vertices of hand and object [n, 3]."""
-        return vertices_of(list(self.parts))
+        """Vertices of hand, object and normals: what must be in the picture [n, 3]."""
+        return vertices_of(list(self.parts), ("hand", "object", "normal"))
 
 
 class Scene:
@@ -105,16 +105,17 @@ class Scene:
 
     Args:
         result: The result.
+        worst: Whether the worst grasp is shown.
 
     Raises:
         GraspAtlasError: If a mesh of the hand or the object cannot be read.
     """
 
-    def __init__(self, result: Result) -> None:
+    def __init__(self, result: Result, *, worst: bool = True) -> None:
         self.result = result
         shapes = BodyShapes(result.problem)
         best = result.refined_best if result.refinement else result.best
-        grasps = (("best", best), ("worst", result.worst))
+        grasps = [("best", best), ("worst", result.worst)][: 2 if worst else 1]
         size = size_of(body_parts(shapes, best))
         sides = [(name, grasp, *grasp_parts(shapes, grasp, size)) for name, grasp in grasps]
         subjects = [subject_of(parts, grasp, size) for _, grasp, parts, _ in sides]
@@ -123,11 +124,11 @@ class Scene:
         #: Best, then worst.
         self.exhibits = tuple(
             Exhibit(name, grasp, _side(parts, right, sign, size), semi_axes)
-            for (name, grasp, parts, semi_axes), sign in zip(sides, (-1.0, 1.0), strict=True)
+            for (name, grasp, parts, semi_axes), sign in zip(sides, (-1.0, 1.0), strict=False)
         )
 
     def camera(self, aspect: float, window: tuple[float, float, float, float]) -> Camera:
-        """Camera that shows both grasps inside a window of its picture.
+        """Camera that shows all grasps inside a window of its picture.
 
         Args:
             aspect: Width over height of the picture.
