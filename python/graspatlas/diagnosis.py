@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from graspatlas.atlas import Status
 from graspatlas.collision import CollisionChecker
@@ -79,7 +80,7 @@ def diagnose(problem: Problem, *, dimension: int | None = None, radius: float | 
             )
         except GraspAtlasError as error:
             return [*findings, Finding(PROBLEM, "first grasp", str(error), "what follows is not known without one")]
-        findings.append(Finding(OK, "first grasp", "none given, but one is found", "x1 below is the one found"))
+        findings.append(_found(problem))
     try:
         t = problem.full_dimension
     except GraspAtlasError as error:
@@ -92,6 +93,17 @@ def diagnose(problem: Problem, *, dimension: int | None = None, radius: float | 
     if r is not None and all(finding.mark != PROBLEM for finding in findings if finding.subject == "hand motions"):
         findings.append(_charts(problem, int(k), float(r)))
     return findings
+
+
+def _found(problem: Problem) -> Finding:
+    """A first grasp was found; how far it is from where it was wanted."""
+    text, hint = "none given, but one is found", "x1 below is the one found"
+    guess, x1 = problem.pose_guess, problem.x1
+    if guess is not None and x1 is not None:
+        metres, angle = guess.offset(x1.object_xyz, Rotation.from_quat(x1.object_quat_xyzw))
+        text += f", {1000.0 * metres:.3g} mm from the pose guess"
+        text += f" and turned by {np.degrees(angle):.3g} degrees" if guess.quat_xyzw else ""
+    return Finding(OK, "first grasp", text, hint)
 
 
 def _size(problem: Problem) -> Finding:
