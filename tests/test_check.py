@@ -302,3 +302,12 @@ def test_a_first_grasp_is_found_where_none_is_given(can):
     without = replace(can, x1=None, reference=can.x1.joints)
     assert found(without, "first grasp").mark == "ok"
     assert found(without, "charts").mark != "problem"
+
+
+def test_without_x1_and_motions_the_rest_is_looked_at_all_the_same(can):
+    """Nobody has hand motions at first, and most have no first grasp."""
+    bare = replace(can, x1=None, motions=None, defaults={})
+    marks = {finding.subject: finding.mark for finding in diagnose(bare)}
+    assert marks["first grasp"] == OK
+    assert marks["hand motions"] == PROBLEM
+    assert {"rank", "contact at x1", "redundancies", "object", "collision at x1"} <= set(marks)

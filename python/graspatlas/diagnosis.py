@@ -75,9 +75,7 @@ def diagnose(problem: Problem, *, dimension: int | None = None, radius: float | 
     findings = [_size(problem)]
     if problem.x1 is None:
         try:
-            problem = with_first_grasp(
-                problem, dimension or problem.defaults.get("dimension") or 2, SEARCH_SECONDS, False
-            )
+            problem = with_first_grasp(problem, _searched_dimension(problem, dimension), SEARCH_SECONDS, False)
         except GraspAtlasError as error:
             return [*findings, Finding(PROBLEM, "first grasp", str(error), "what follows is not known without one")]
         findings.append(_found(problem))
@@ -93,6 +91,17 @@ def diagnose(problem: Problem, *, dimension: int | None = None, radius: float | 
     if r is not None and all(finding.mark != PROBLEM for finding in findings if finding.subject == "hand motions"):
         findings.append(_charts(problem, int(k), float(r)))
     return findings
+
+
+def _searched_dimension(problem: Problem, dimension: int | None) -> int:
+    """Dimension in which a first grasp is sought: the wanted one, or where it cannot be, the largest that can."""
+    largest = problem.largest_dimension
+    wanted = dimension or int(problem.defaults.get("dimension") or min(2, largest))
+    try:
+        problem.frozen_motions(wanted)
+    except GraspAtlasError:
+        return largest
+    return wanted
 
 
 def _found(problem: Problem) -> Finding:
@@ -118,8 +127,7 @@ def _size(problem: Problem) -> Finding:
 
 def _rank(problem: Problem) -> Finding:
     equations, t = problem.full_system.n_equations, problem.full_dimension
-    largest = t - (len(problem.motions.couplings) if problem.motions else 0)
-    hint = f"a dimension k from 1 to {largest} is possible"
+    hint = f"a dimension k from 1 to {problem.largest_dimension} is possible"
     return Finding(OK, "rank", f"{equations} of {equations} at x1, so t = {t}", hint)
 
 

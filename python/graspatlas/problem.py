@@ -213,6 +213,11 @@ class Problem:
             )
         return system.dimension
 
+    @property
+    def largest_dimension(self) -> int:
+        """Largest possible k: t less the couplings, which are always frozen."""
+        return self.full_dimension - (len(self.motions.couplings) if self.motions is not None else 0)
+
     def _random_points(self, count: int) -> list[Array]:
         """Configurations round the reference posture that touch nothing; their bounds are not looked at."""
         system, rng = self.full_system, np.random.default_rng(0)

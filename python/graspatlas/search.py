@@ -51,7 +51,7 @@ def find_grasps(
         problem: The problem.
         count: How many different grasps to find.
         dimension: k, of the relevant grasps R to search: hand motions are frozen at the problem's reference posture, eq
-            (13). All feasible grasps F by default.
+            (13). All feasible grasps F by default, couplings kept.
         seed: Of the random numbers: the same seed finds the same grasps.
         max_seconds: Time after which the search is cut short; none by default.
         progress: Show a progress bar on standard error; by default when it is a terminal.
@@ -67,7 +67,7 @@ def find_grasps(
         raise GraspAtlasError(f"count must be a whole number of at least 1, got {count!r}")
     if not isinstance(problem, Problem):
         raise GraspAtlasError(f"problem must be a graspatlas.Problem, got {type(problem).__name__}; see load_problem")
-    search = GraspSearch(problem, problem.full_dimension if dimension is None else dimension, seed)
+    search = GraspSearch(problem, problem.largest_dimension if dimension is None else dimension, seed)
     deadline, last_new = deadline_after(max_seconds), 0
     found: list[Array] = []
     places: list[Array] = []
