@@ -30,6 +30,10 @@ TAKES_PART = 1e-3
 AWAY = 0.1
 #: A joint or parameter this near its limit is pointed out [rad, or lengths / length_scale].
 NEAR_LIMIT = 0.02
+#: A contact point this far from the collision shape that it should lie on is pointed out; shapes approximate [m].
+OFF_SHAPE = 2e-3
+#: How far along its outward normal a contact point is moved to see whether it comes out of the shape [m].
+OUTWARDS = 1e-3
 #: Less kept variance than this is pointed out.
 LITTLE_VARIANCE = 0.9
 #: Two variances closer than this share of the largest are the same.
@@ -86,7 +90,7 @@ def diagnose(problem: Problem, *, dimension: int | None = None, radius: float | 
     findings.append(_rank(problem))
     k = dimension or problem.defaults.get("dimension") or min(2, t)
     findings += [*_motions(problem, k), *_contacts(problem), *_limits(problem), *_redundancies(problem)]
-    findings += [_collision(problem), _defaults(problem)]
+    findings += [*_shapes(problem), _collision(problem), _defaults(problem)]
     r = radius or problem.defaults.get("radius")
     if r is not None and all(finding.mark != PROBLEM for finding in findings if finding.subject == "hand motions"):
         findings.append(_charts(problem, int(k), float(r)))
@@ -244,6 +248,34 @@ def _redundancies(problem: Problem) -> Iterator[Finding]:
         yield Finding(NOTE, "object", text, hint)
     else:
         yield Finding(OK, "object", "it stays where it is while the hand stays still", "no grasp is traced twice")
+
+
+def _shapes(problem: Problem) -> Iterator[Finding]:
+    """Whether what touches is what collides: patches against collision shapes, which are stated apart."""
+    try:
+        checker = CollisionChecker(problem)
+    except GraspAtlasError:
+        return  # which the next finding says
+    x = problem.x1_array
+    arrays = problem.full_system.grasp_arrays(x[None])
+    largest, faults = 0.0, []
+    for i, contact in enumerate(problem.contacts):
+        for side, frame in (("hand", contact.frame), ("object", None)):
+            point, normal = arrays[f"{side}_points"][0, i], arrays[f"{side}_normals"][0, i]
+            here, out = checker.depths(x, frame, [point, point + OUTWARDS * normal])
+            what = f"{contact.frame}: the {side}'s"
+            if np.isfinite(here):
+                largest = max(largest, abs(here))
+            if np.isfinite(here) and abs(here) > OFF_SHAPE:
+                faults.append(f"{what} point is {1000.0 * abs(here):.3g} mm off the surface of its collision shape")
+            elif out < here - 0.5 * OUTWARDS:
+                faults.append(f"{what} normal points into its collision shape")
+    if faults:
+        hint = "patches touch, shapes collide: compare the point or axis, the normal and the units of both"
+        yield Finding(NOTE, "shapes at x1", "; ".join(faults), hint)
+    else:
+        text = f"contact points lie on the collision shapes, to {1000.0 * largest:.2f} mm"
+        yield Finding(OK, "shapes at x1", text, "what touches is what collides")
 
 
 def _collision(problem: Problem) -> Finding:
