@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -302,3 +303,42 @@ def test_a_first_grasp_is_found_where_none_is_given(can):
     without = replace(can, x1=None, reference=can.x1.joints)
     assert found(without, "first grasp").mark == "ok"
     assert found(without, "charts").mark != "problem"
+
+
+def test_without_x1_and_motions_the_rest_is_looked_at_all_the_same(can):
+    """Nobody has hand motions at first, and most have no first grasp."""
+    bare = replace(can, x1=None, motions=None, defaults={})
+    marks = {finding.subject: finding.mark for finding in diagnose(bare)}
+    assert marks["first grasp"] == OK
+    assert marks["hand motions"] == PROBLEM
+    assert {"rank", "contact at x1", "redundancies", "object", "collision at x1"} <= set(marks)
+
+
+def changed(problem, **sides):
+    """The problem with other patches at its second contact."""
+    first, second, *rest = problem.contacts
+    return replace(problem, contacts=(first, replace(second, **sides), *rest), x1=None, reference=problem.x1.joints)
+
+
+def test_patches_that_lie_off_the_shapes_are_pointed_out():
+    """Nothing in the equations says so: a patch and the shape that collides are stated apart."""
+    problem = ga.load_problem("allegro_cylinder")
+    right = found(problem, "shapes at x1")
+    assert (right.mark, right.text) == (OK, "contact points lie on the collision shapes, to 0.00 mm")
+    wall, pad = problem.contacts[1].object, problem.contacts[1].hand
+    frame = problem.contacts[1].frame
+    for sides, words in (
+        ({"object": replace(wall, radius=0.025)}, rf"{frame}: the object's point is 5 mm off the surface"),
+        ({"hand": replace(pad, position=(0.0, 0.0, 0.03))}, rf"{frame}: the hand's point is [\d.]+ mm off"),
+        ({"hand": replace(pad, normal=tuple(-c for c in pad.normal))}, rf"^{frame}: the hand's normal points into"),
+        ({"object": replace(wall, flipped=True)}, rf"^{frame}: the object's normal points into"),
+    ):
+        finding = found(changed(problem, **sides), "shapes at x1")
+        assert finding.mark == NOTE
+        assert re.search(words, finding.text), finding.text
+        assert finding.text.count(":") == 1  # and nothing is said of the others
+
+
+@pytest.mark.parametrize("name", ga.bundled_problems())
+def test_the_bundled_patches_lie_on_the_shapes(name):
+    assert found(ga.load_problem(name), "shapes at x1").mark == OK

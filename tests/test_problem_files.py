@@ -234,6 +234,32 @@ BROKEN: dict[str, tuple[str, str, str]] = {
         "  urdf: objects/can.urdf\n  joint: slider",
         "can.yaml:18: object.joint: must be 'free_flyer' or 'planar', got 'slider'",
     ),
+    "guess of two numbers": (
+        "  urdf: objects/can.urdf",
+        "  urdf: objects/can.urdf\n  pose_guess: {xyz: [0, 0.1]}",
+        "can.yaml:18: object.pose_guess.xyz: must hold 3 items, got 2",
+    ),
+    "guess of a rotation alone": (
+        "  urdf: objects/can.urdf",
+        "  urdf: objects/can.urdf\n  pose_guess:\n    quat_xyzw: [0, 0, 0, 1]",
+        "can.yaml:18: object.pose_guess.xyz: is missing",
+    ),
+    "guess without rotation": (
+        "  urdf: objects/can.urdf",
+        "  urdf: objects/can.urdf\n  pose_guess:\n    xyz: [0, 0, 0]\n    quat_xyzw: [0, 0, 0, 0]",
+        "can.yaml:18: object.pose_guess: the pose guess has a quaternion of length zero",
+    ),
+    "guess out of the plane": (
+        "  urdf: objects/can.urdf",
+        "  urdf: objects/can.urdf\n  joint: planar\n  pose_guess: {xyz: [0, 0, 0.1]}",
+        "can.yaml:19: object.pose_guess: the object moves in the x-y plane, so 'pose_guess' must lie there: z = 0, and "
+        "turned about z only",
+    ),
+    "guess misspelt": (
+        "  urdf: objects/can.urdf",
+        "  urdf: objects/can.urdf\n  pose_gess: {xyz: [0, 0, 0.1]}",
+        "can.yaml:18: object.pose_gess: field 'pose_gess' is unknown; did you mean 'pose_guess'?",
+    ),
     "unknown index": (
         "quality: manipulability_volume",
         "quality: manipulability_volum",

@@ -211,3 +211,19 @@ def test_the_command_line_refines(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert summary["refined"]["gain"] > 0.0
     assert main(["optimize", "planar_hand", "--refine", "feasible"]) == 0
     assert "among all feasible grasps" in capsys.readouterr().out
+
+
+def test_couplings_hold_among_all_feasible_grasps() -> None:
+    """A coupling is what the hand is built like: climbing in F lets go of the other frozen motions only."""
+    bundled = ga.load_problem("allegro_cylinder")
+    couplings, h = bundled.motions.couplings[:3], len(bundled.hand.joints)
+    motions = replace(bundled.motions, covariance=np.diag(np.linspace(1.0, 0.1, h)), couplings=couplings)
+    problem = replace(bundled, motions=motions)
+    assert problem.largest_dimension == problem.full_dimension - 3
+    result = ga.optimize(problem, dimension=2, radius=0.4, refine="feasible")
+    best = result.refined_best
+    assert best.quality > ga.optimize(problem, dimension=2, radius=0.4, refine=True).refined_best.quality
+    kept = motions.reordered(problem.hand.joints).couplings
+    for x in (best.x, *ga.find_grasps(problem, count=3)):
+        np.testing.assert_allclose(kept @ (x[:h] - problem.reference_array), 0.0, atol=1e-7)
+    assert result.check().passed

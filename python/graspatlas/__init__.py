@@ -16,6 +16,7 @@ from graspatlas.motions import HandMotions
 from graspatlas.optimizer import build_atlas, optimize
 from graspatlas.pareto import pareto_front
 from graspatlas.paths import GraspPath, Path, shortest_path
+from graspatlas.pose_guess import PoseGuess
 from graspatlas.problem import Problem
 from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.projection import project
@@ -62,6 +63,7 @@ __all__ = [
     "JointMargin",
     "Path",
     "Peak",
+    "PoseGuess",
     "Problem",
     "Refinement",
     "Result",

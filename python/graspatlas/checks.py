@@ -253,13 +253,14 @@ def _result_checks(result: Result) -> Iterator[Check]:
 def _refinement_checks(result: Result, refinement: Refinement) -> Iterator[Check]:
     """The local maxima are grasps of the system, meet the requirements, and none is worse than its chart."""
     problem = result.problem
-    system = problem.full_system if refinement.all_motions else problem.system(result.dimension)
+    dimension = problem.largest_dimension if refinement.all_motions else result.dimension
+    system = problem.system(dimension)
     residuals = [np.abs(system.evaluate_residual(x)).max(initial=0.0) for x in refinement.x]
     yield Check("largest residual of a refined grasp", float(np.max(residuals)), RESIDUAL_TOLERANCE)
     slacks = [system.slack(x).min(initial=np.inf) for x in refinement.x]
     yield Check("farthest that a refined grasp lies outside its bounds", float(-np.min(slacks)), RESIDUAL_TOLERANCE)
-    if not refinement.all_motions:
-        frozen = float(np.abs(problem.frozen_residual(refinement.x, result.dimension)).max(initial=0.0))
+    if problem.frozen_motions(dimension) > 0:
+        frozen = float(np.abs(problem.frozen_residual(refinement.x, dimension)).max(initial=0.0))
         yield Check("frozen hand motions of the refined grasps are off by", frozen, RESIDUAL_TOLERANCE)
     grasps = Grasps(problem, refinement.x, system)
     if result.quality in INDICES:

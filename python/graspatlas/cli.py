@@ -112,7 +112,7 @@ def _parser() -> argparse.ArgumentParser:
         default=False,
         metavar="WHERE",
         help="climb to the maximum between the charts' centres: among the relevant grasps, or with 'feasible' on among "
-        "all feasible ones, no hand motion frozen",
+        "all feasible ones, no hand motion frozen but couplings",
     )
     best.add_argument("--max-charts", type=int, metavar="N", help="cut the atlas short after N charts")
     best.add_argument("--max-seconds", type=float, metavar="S", help="cut the atlas short after S seconds")

@@ -23,6 +23,8 @@ __all__ = ["CollisionChecker"]
 OBJECT = "object/"
 #: Distances are as exact as this, so that optimisers can differentiate them; depths are not [m].
 DISTANCE_TOLERANCE = 1e-10
+#: Radius of the ball that stands for a point [m].
+DOT = 1e-6
 #: Grasps are checked in batches of this size, on all cores, unless there are very few.
 BATCH = 2048
 SMALLEST_BATCH = 64
@@ -125,6 +127,35 @@ class CollisionChecker:
             self._pin.updateGeometryPlacements(self._model, data, self._geometry, geometry_data, q)
             row[:] = [distance(self._geometry, geometry_data, int(pair)).min_distance for pair in chosen]
         return np.asarray(out - self._required[chosen])
+
+    def depths(self, x: ArrayLike, frame: str | None, points: ArrayLike) -> NDArray[np.float64]:
+        """How far points are from the collision shapes of a link or of the object, at a grasp.
+
+        Args:
+            x: The grasp [configuration_size].
+            frame: Link of the hand, of which the shapes of its joint count; the object where there is none.
+            points: The points in the palm's frame [n, 3], metres.
+
+        Returns:
+            Distance of each point from the nearest shape [n], metres: negative inside of shapes other than meshes, and
+            infinite where there is no shape.
+        """
+        import coal
+
+        q = np.asarray(x, float)[: self._model.nq]
+        self._pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._geometry_data, q)
+        joint = None if frame is None else self._model.frames[self._model.getFrameId(frame)].parentJoint
+        dot, request = coal.Sphere(DOT), coal.DistanceRequest()
+        out = np.full(len(np.atleast_2d(points)), np.inf)
+        for shape, placement in zip(self._geometry.geometryObjects, self._geometry_data.oMg, strict=True):
+            in_object = shape.name.startswith(OBJECT)
+            if in_object if joint is None else not in_object and shape.parentJoint == joint:
+                at = coal.Transform3s(placement.rotation, placement.translation)
+                for i, point in enumerate(np.atleast_2d(points)):
+                    here = coal.Transform3s(np.eye(3), np.asarray(point, float))
+                    gap = coal.distance(dot, here, shape.geometry, at, request, coal.DistanceResult())
+                    out[i] = min(out[i], gap + DOT)
+        return out
 
 
 def _joined(problem: Problem) -> tuple[Any, Any]:

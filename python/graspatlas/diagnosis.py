@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from graspatlas.atlas import Status
 from graspatlas.collision import CollisionChecker
@@ -29,6 +30,10 @@ TAKES_PART = 1e-3
 AWAY = 0.1
 #: A joint or parameter this near its limit is pointed out [rad, or lengths / length_scale].
 NEAR_LIMIT = 0.02
+#: A contact point this far from the collision shape that it should lie on is pointed out; shapes approximate [m].
+OFF_SHAPE = 2e-3
+#: How far along its outward normal a contact point is moved to see whether it comes out of the shape [m].
+OUTWARDS = 1e-3
 #: Less kept variance than this is pointed out.
 LITTLE_VARIANCE = 0.9
 #: Two variances closer than this share of the largest are the same.
@@ -74,12 +79,10 @@ def diagnose(problem: Problem, *, dimension: int | None = None, radius: float | 
     findings = [_size(problem)]
     if problem.x1 is None:
         try:
-            problem = with_first_grasp(
-                problem, dimension or problem.defaults.get("dimension") or 2, SEARCH_SECONDS, False
-            )
+            problem = with_first_grasp(problem, _searched_dimension(problem, dimension), SEARCH_SECONDS, False)
         except GraspAtlasError as error:
             return [*findings, Finding(PROBLEM, "first grasp", str(error), "what follows is not known without one")]
-        findings.append(Finding(OK, "first grasp", "none given, but one is found", "x1 below is the one found"))
+        findings.append(_found(problem))
     try:
         t = problem.full_dimension
     except GraspAtlasError as error:
@@ -87,11 +90,33 @@ def diagnose(problem: Problem, *, dimension: int | None = None, radius: float | 
     findings.append(_rank(problem))
     k = dimension or problem.defaults.get("dimension") or min(2, t)
     findings += [*_motions(problem, k), *_contacts(problem), *_limits(problem), *_redundancies(problem)]
-    findings += [_collision(problem), _defaults(problem)]
+    findings += [*_shapes(problem), _collision(problem), _defaults(problem)]
     r = radius or problem.defaults.get("radius")
     if r is not None and all(finding.mark != PROBLEM for finding in findings if finding.subject == "hand motions"):
         findings.append(_charts(problem, int(k), float(r)))
     return findings
+
+
+def _searched_dimension(problem: Problem, dimension: int | None) -> int:
+    """Dimension in which a first grasp is sought: the wanted one, or where it cannot be, the largest that can."""
+    largest = problem.largest_dimension
+    wanted = dimension or int(problem.defaults.get("dimension") or min(2, largest))
+    try:
+        problem.frozen_motions(wanted)
+    except GraspAtlasError:
+        return largest
+    return wanted
+
+
+def _found(problem: Problem) -> Finding:
+    """A first grasp was found; how far it is from where it was wanted."""
+    text, hint = "none given, but one is found", "x1 below is the one found"
+    guess, x1 = problem.pose_guess, problem.x1
+    if guess is not None and x1 is not None:
+        metres, angle = guess.offset(x1.object_xyz, Rotation.from_quat(x1.object_quat_xyzw))
+        text += f", {1000.0 * metres:.3g} mm from the pose guess"
+        text += f" and turned by {np.degrees(angle):.3g} degrees" if guess.quat_xyzw else ""
+    return Finding(OK, "first grasp", text, hint)
 
 
 def _size(problem: Problem) -> Finding:
@@ -106,8 +131,7 @@ def _size(problem: Problem) -> Finding:
 
 def _rank(problem: Problem) -> Finding:
     equations, t = problem.full_system.n_equations, problem.full_dimension
-    largest = t - (len(problem.motions.couplings) if problem.motions else 0)
-    hint = f"a dimension k from 1 to {largest} is possible"
+    hint = f"a dimension k from 1 to {problem.largest_dimension} is possible"
     return Finding(OK, "rank", f"{equations} of {equations} at x1, so t = {t}", hint)
 
 
@@ -224,6 +248,34 @@ def _redundancies(problem: Problem) -> Iterator[Finding]:
         yield Finding(NOTE, "object", text, hint)
     else:
         yield Finding(OK, "object", "it stays where it is while the hand stays still", "no grasp is traced twice")
+
+
+def _shapes(problem: Problem) -> Iterator[Finding]:
+    """Whether what touches is what collides: patches against collision shapes, which are stated apart."""
+    try:
+        checker = CollisionChecker(problem)
+    except GraspAtlasError:
+        return  # which the next finding says
+    x = problem.x1_array
+    arrays = problem.full_system.grasp_arrays(x[None])
+    largest, faults = 0.0, []
+    for i, contact in enumerate(problem.contacts):
+        for side, frame in (("hand", contact.frame), ("object", None)):
+            point, normal = arrays[f"{side}_points"][0, i], arrays[f"{side}_normals"][0, i]
+            here, out = checker.depths(x, frame, [point, point + OUTWARDS * normal])
+            what = f"{contact.frame}: the {side}'s"
+            if np.isfinite(here):
+                largest = max(largest, abs(here))
+            if np.isfinite(here) and abs(here) > OFF_SHAPE:
+                faults.append(f"{what} point is {1000.0 * abs(here):.3g} mm off the surface of its collision shape")
+            elif out < here - 0.5 * OUTWARDS:
+                faults.append(f"{what} normal points into its collision shape")
+    if faults:
+        hint = "patches touch, shapes collide: compare the point or axis, the normal and the units of both"
+        yield Finding(NOTE, "shapes at x1", "; ".join(faults), hint)
+    else:
+        text = f"contact points lie on the collision shapes, to {1000.0 * largest:.2f} mm"
+        yield Finding(OK, "shapes at x1", text, "what touches is what collides")
 
 
 def _collision(problem: Problem) -> Finding:

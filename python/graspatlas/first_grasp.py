@@ -14,9 +14,9 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand import Hand
 from graspatlas.patches import Patch
 from graspatlas.patches.touch import touching_parameters
-from graspatlas.tables import checked_table, number, number_array, numbers
+from graspatlas.tables import checked_table, number, number_array, numbers, shown
 
-__all__ = ["FirstGrasp", "first_grasp_from_array", "first_grasp_to_array", "posture_array"]
+__all__ = ["FirstGrasp", "first_grasp_from_array", "first_grasp_to_array", "posture_array", "unit_quaternion"]
 
 Array = NDArray[np.float64]
 
@@ -51,13 +51,7 @@ class FirstGrasp:
         values = np.concatenate([joints, xyz, quaternion, parameters])
         if not (np.abs(values) < LARGEST).all():
             raise GraspAtlasError(f"x1 holds a number that is not finite, or not below {LARGEST:g}")
-        norm = float(np.linalg.norm(quaternion))
-        if norm < 1e-6:
-            raise GraspAtlasError("x1 has a quaternion of length zero")
-        # One that is unit to rounding stays as it came, so that a stored problem is the same problem.
-        norm = 1.0 if abs(norm - 1.0) < 1e-12 else norm
-        x, y, z, w = (float(c) / norm for c in self.object_quat_xyzw)
-        object.__setattr__(self, "object_quat_xyzw", (x, y, z, w))
+        object.__setattr__(self, "object_quat_xyzw", unit_quaternion(self.object_quat_xyzw, "x1"))
 
     def to_dict(self) -> dict[str, Any]:
         """The first grasp as plain data."""
@@ -84,6 +78,28 @@ class FirstGrasp:
             object_quat_xyzw=numbers(table["object_quat_xyzw"], "object_quat_xyzw"),  # type: ignore[arg-type]
             parameters=None if parameters is None else numbers(parameters, "parameters"),
         )
+
+
+def unit_quaternion(quaternion: Sequence[float], what: str) -> tuple[float, float, float, float]:
+    """A quaternion (x, y, z, w) of length one.
+
+    Args:
+        quaternion: Of any other length.
+        what: What has it, for messages.
+
+    Raises:
+        GraspAtlasError: If it is no four finite numbers, or zero.
+    """
+    array = number_array(quaternion, f"the quaternion of {what}")
+    if array.shape != (4,) or not (np.abs(array) < LARGEST).all():
+        raise GraspAtlasError(f"{what} needs a quaternion of 4 finite numbers, got {shown(quaternion)}")
+    norm = float(np.linalg.norm(array))
+    if norm < 1e-6:
+        raise GraspAtlasError(f"{what} has a quaternion of length zero")
+    # One that is unit to rounding stays as it came, so that a stored problem is the same problem.
+    norm = 1.0 if abs(norm - 1.0) < 1e-12 else norm
+    x, y, z, w = (float(c) / norm for c in quaternion)
+    return (x, y, z, w)
 
 
 def posture_array(hand: Hand, joints: Mapping[str, float], what: str) -> Array:

@@ -125,7 +125,7 @@ def climb(result: Result, start: int | ArrayLike, *, all_motions: bool = False, 
     Args:
         result: The result; its index may be any callable.
         start: Number of the chart at whose centre to start, or a grasp [configuration_size].
-        all_motions: Climb in all t dimensions of F, no hand motion frozen, instead of in R.
+        all_motions: Climb in all t dimensions of F, no hand motion frozen but the couplings, instead of in R.
         max_steps: Steps after which the climb is given up: an index without bound is climbed for ever.
 
     Returns:
@@ -196,7 +196,7 @@ class _Hill:
             raise GraspAtlasError(
                 f"requirement '{unknown[0]}' is a function, which files do not keep: compute the result again"
             )
-        system = result.problem.full_system if all_motions else result.problem.system(result.dimension)
+        system = result.problem.system(result.problem.largest_dimension if all_motions else result.dimension)
         return cls(result.problem, system, result.quality, tuple(result.requirements), result.atlas.radius)  # type: ignore[arg-type]
 
     def grasps(self, X: ArrayLike) -> Grasps:

@@ -19,6 +19,7 @@ from graspatlas.first_grasp import FirstGrasp, first_grasp_from_array, first_gra
 from graspatlas.hand import Body, Hand
 from graspatlas.motions import HandMotions
 from graspatlas.patches import Patch
+from graspatlas.pose_guess import PoseGuess
 from graspatlas.requirements import Requirement, requirement_from_dict
 from graspatlas.tables import checked_instance, checked_table, number, number_array, shown
 
@@ -55,6 +56,7 @@ class Problem:
         x1: A feasible first grasp; without one, :func:`graspatlas.find_grasps` finds some.
         reference: Joint positions by name [rad or m] through which the hand motions that are kept pass: x_1,h of
             eq (13). By default those of x1; without x1 the mean of the hand motions, moved within the joint limits.
+        pose_guess: About where the object is when it is held; without x1 the search for a first grasp starts there.
         motions: Principal hand motions; without them only the full dimension t can be traced.
         object_joint: How the object moves: ``"free_flyer"``, or ``"planar"`` for problems in the palm's x-y plane.
         length_scale: Length that counts as much as one radian [m].
@@ -79,6 +81,7 @@ class Problem:
     requirements: tuple[Requirement, ...] = ()
     description: str = ""
     source: str = ""
+    pose_guess: PoseGuess | None = None
 
     def __post_init__(self) -> None:
         self._check_types()
@@ -91,6 +94,8 @@ class Problem:
             raise GraspAtlasError(f"length_scale must lie between {low:g} and {high:g} m, got {self.length_scale}")
         if self.object_joint not in OBJECT_JOINTS:
             raise unknown_name("object joint", self.object_joint, OBJECT_JOINTS)
+        if self.pose_guess is not None and self.object_joint == "planar":
+            self.pose_guess.check_in_plane()
         self._check_joints()
         for contact in self.contacts:
             self.hand.frame(contact.frame)
@@ -105,6 +110,7 @@ class Problem:
         for contact in self.contacts:
             checked_instance(contact, Contact, "a contact")
         checked_instance(self.x1, (FirstGrasp, type(None)), "x1")
+        checked_instance(self.pose_guess, (PoseGuess, type(None)), "pose_guess")
         checked_instance(self.motions, (HandMotions, type(None)), "motions", "HandMotions.from_samples")
         checked_table(self.defaults, "defaults", (), DEFAULTS)
         number(self.length_scale, "length_scale")
@@ -206,6 +212,11 @@ class Problem:
                 "the redundant contact or bend some fingers"
             )
         return system.dimension
+
+    @property
+    def largest_dimension(self) -> int:
+        """Largest possible k: t less the couplings, which are always frozen."""
+        return self.full_dimension - (len(self.motions.couplings) if self.motions is not None else 0)
 
     def _random_points(self, count: int) -> list[Array]:
         """Configurations round the reference posture that touch nothing; their bounds are not looked at."""
@@ -377,6 +388,8 @@ class Problem:
             table["requirements"] = [requirement.to_dict() for requirement in self.requirements]
         if self.reference is not None:
             table["reference"] = dict(self.reference)
+        if self.pose_guess is not None:
+            table["object"]["pose_guess"] = self.pose_guess.to_dict()
         return table
 
     @classmethod
@@ -402,7 +415,7 @@ class Problem:
         )
         table = checked_table(data, "the problem", ("name", "hand", "object", "contacts"), optional)
         body = dict(checked_table(table["object"], "the object", ("urdf",), None))
-        object_joint = str(body.pop("joint", "free_flyer"))
+        object_joint, guess = str(body.pop("joint", "free_flyer")), body.pop("pose_guess", None)
         motions = table.get("hand_motions")
         if not isinstance(table["contacts"], list):
             raise GraspAtlasError("contacts must be a list of tables")
@@ -414,6 +427,7 @@ class Problem:
             contacts=tuple(Contact.from_dict(item) for item in table["contacts"]),
             x1=FirstGrasp.from_dict(table["x1"]) if table.get("x1") is not None else None,
             reference=table.get("reference"),
+            pose_guess=PoseGuess.from_dict(guess) if guess is not None else None,
             motions=HandMotions.from_dict(motions) if motions else None,
             length_scale=number(table.get("length_scale", 0.01), "length_scale"),
             defaults=dict(checked_table(table.get("defaults") or {}, "defaults", (), DEFAULTS)),

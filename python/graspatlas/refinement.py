@@ -36,7 +36,7 @@ class Refinement:
         qualities: The index there [p].
         starts: Chart from which the climb to each began [p].
         converged: False for those that were still climbing when given up: the index may have no maximum there [p].
-        all_motions: True when no hand motion was frozen: the grasps lie in F, not only in R.
+        all_motions: True when no hand motion was frozen but the couplings: the grasps lie in F, not only in R.
         complete: False when interrupted, so that basins may be missing, or climbs in F.
     """
 
@@ -61,7 +61,7 @@ def refine(result: Result, *, all_motions: bool = False, progress: bool | None =
 
     Args:
         result: The result.
-        all_motions: Go on from there in all t dimensions of F, no hand motion frozen.
+        all_motions: Go on from there in all t dimensions of F, no hand motion frozen but the couplings.
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
     Returns:

@@ -1,7 +1,8 @@
 """Feasible grasps found from nothing but hand, object, patches and limits: where a first grasp comes from.
 
 Each try starts at a random configuration that nearly touches, see :mod:`graspatlas.starts`, and lets
-:func:`~graspatlas.projection.project` close what gaps are left.
+:func:`~graspatlas.projection.project` close what gaps are left. Where the problem guesses the object's pose, the tries
+at a first grasp start near that, see :mod:`graspatlas.guessed_starts`.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from graspatlas.errors import GraspAtlasError
+from graspatlas.guessed_starts import starts_near
 from graspatlas.problem import Problem
 from graspatlas.projection import project
 from graspatlas.starts import Starts
@@ -41,13 +43,15 @@ def find_grasps(
 ) -> Array:
     """Find feasible grasps of a problem; its x1 plays no part, but the reference posture does.
 
+    The first is sought near the problem's ``pose_guess``, if it has one and no x1.
+
     The search ends early after 20,000 tries without a new grasp. Ctrl-C ends it too, and returns what there is.
 
     Args:
         problem: The problem.
         count: How many different grasps to find.
         dimension: k, of the relevant grasps R to search: hand motions are frozen at the problem's reference posture, eq
-            (13). All feasible grasps F by default.
+            (13). All feasible grasps F by default, couplings kept.
         seed: Of the random numbers: the same seed finds the same grasps.
         max_seconds: Time after which the search is cut short; none by default.
         progress: Show a progress bar on standard error; by default when it is a terminal.
@@ -63,7 +67,7 @@ def find_grasps(
         raise GraspAtlasError(f"count must be a whole number of at least 1, got {count!r}")
     if not isinstance(problem, Problem):
         raise GraspAtlasError(f"problem must be a graspatlas.Problem, got {type(problem).__name__}; see load_problem")
-    search = GraspSearch(problem, problem.full_dimension if dimension is None else dimension, seed)
+    search = GraspSearch(problem, problem.largest_dimension if dimension is None else dimension, seed)
     deadline, last_new = deadline_after(max_seconds), 0
     found: list[Array] = []
     places: list[Array] = []
@@ -149,6 +153,8 @@ class GraspSearch:
         self.dimension, self.tries, self.found = dimension, 0, 0
         self._rng = np.random.default_rng(seed)
         self._starts = Starts(self.problem, self.system)
+        guess = problem.pose_guess if problem.x1 is None else None
+        self._near_guess = starts_near(guess, self._starts, self._rng) if guess else iter(())
 
     def next_grasp(self, deadline: float, bar: tqdm[None]) -> Array | None:
         """The next grasp [size of x]; None after ``MAX_TRIES`` tries without one, or when the clock passes `deadline`.
@@ -169,7 +175,9 @@ class GraspSearch:
     def attempt(self) -> Array | None:
         """One try: a feasible grasp [size of x], or None."""
         self.tries += 1
-        x = project(self.system, self._starts.draw(self._rng))
+        # The first grasp only: what is found later must tell of all grasps, not of those near the guess.
+        start = next(self._near_guess, None) if self.found == 0 else None
+        x = project(self.system, self._starts.draw(self._rng) if start is None else start)
         if x is None or not self._starts.has_posture_of(x) or not self._opposed(x):
             return None
         self.found += 1
@@ -183,7 +191,7 @@ class GraspSearch:
     def failure(self) -> GraspAtlasError:
         """What to say when no grasp was found."""
         s = self.problem.frozen_motions(self.dimension)
-        hint = "check that the object fits the hand, its patches and the joint limits, or give x1"
+        hint = "check that the object fits the hand, its patches and the joint limits; or give a pose_guess, or x1"
         if s > 0:
             hint = (
                 f"the {s} frozen hand motions may leave none: give a reference posture near a grasp, or let them pass "

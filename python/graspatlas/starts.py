@@ -29,6 +29,9 @@ class Starts:
     limits; parameters are uniform in their intervals. What has no limits stays within half a turn, or the size of the
     hand, of the reference.
 
+    Attributes:
+        hand_size: Distance of the farthest link from the palm's origin, and a little more [m].
+
     Args:
         problem: The problem.
         system: Its system of some dimension.
@@ -40,10 +43,10 @@ class Starts:
         q = problem.reference_array
         self._reference = np.r_[q, self._pose, np.zeros(system.n_parameters)]
         places = problem.hand.link_placements(q)
-        self._hand_size = max(float(np.linalg.norm(T[:3, 3])) for T in places.values()) + problem.length_scale
+        self.hand_size = max(float(np.linalg.norm(T[:3, 3])) for T in places.values()) + problem.length_scale
         free = [patch.interval(name) or (-HALF_TURN, HALF_TURN) for c in problem.contacts for patch, name in c.free()]
         ends = np.array(free, float).reshape(-1, 2)
-        self._lower, self._upper = np.where(np.isinf(ends), np.sign(ends) * self._hand_size, ends).T
+        self._lower, self._upper = np.where(np.isinf(ends), np.sign(ends) * self.hand_size, ends).T
         self._motions = self._kept_motions()
         self._A, self._b = self._posture_bounds()
         self._y = self._middle()
@@ -57,6 +60,45 @@ class Starts:
         x = np.asarray(self._system.integrate(self._reference, step))
         x[len(x) - len(self._lower) :] = rng.uniform(self._lower, self._upper)
         return self._place_object(x, rng)
+
+    def at_pose(self, xyz: Array, rotation: Rotation, rng: np.random.Generator) -> Array:
+        """A start [configuration_size] in the reference posture, the object's patches nearest to the hand's points.
+
+        Args:
+            xyz: Position of the object in the palm's frame [3], metres.
+            rotation: Its rotation.
+            rng: Random numbers, for the free parameters of the hand's patches.
+        """
+        x: Array = self._reference.copy()
+        self._set_pose(x, xyz, rotation)
+        at = len(x) - len(self._lower)
+        x[at:] = rng.uniform(self._lower, self._upper)
+        points = (self._system.grasp_arrays(x[None])["hand_points"][0] - xyz) @ rotation.as_matrix()
+        for contact, point in zip(self._problem.contacts, points, strict=True):
+            on_object = [name for name in contact.object.parameters if name not in contact.frozen]
+            nearest = dict(zip("uv", contact.object.locate(point), strict=True))
+            at += len(contact.free())
+            x[at - len(on_object) : at] = [nearest[name] for name in on_object]
+        first = len(x) - len(self._lower)
+        x[first:] = np.clip(x[first:], self._lower, self._upper)
+        return x
+
+    def pose(self, x: Array) -> tuple[Array, Rotation]:
+        """Position [3] and rotation of the object in the palm's frame at a configuration x."""
+        at = len(self._problem.reference_array)
+        if self._problem.object_joint == "planar":
+            return np.r_[x[at : at + 2], 0.0], Rotation.from_rotvec([0.0, 0.0, np.arctan2(x[at + 3], x[at + 2])])
+        return x[at : at + 3], Rotation.from_quat(x[at + 3 : at + 7])
+
+    def _set_pose(self, x: Array, xyz: Array, rotation: Rotation) -> None:
+        """Put the object of a configuration x there; in the plane only what lies in it counts."""
+        at = len(self._problem.reference_array)
+        if self._problem.object_joint == "planar":
+            R = rotation.as_matrix()
+            angle = np.arctan2(R[1, 0], R[0, 0])
+            x[at : at + 4] = [*xyz[:2], np.cos(angle), np.sin(angle)]
+        else:
+            x[at : at + 7] = [*xyz, *rotation.as_quat()]
 
     def has_posture_of(self, x: Array) -> bool:
         """True when a grasp x has a posture that could be drawn, its unlimited joints within half a turn."""
@@ -84,7 +126,7 @@ class Starts:
         A, b = [], []
         for joint in hand.model.hand_joints:
             row, unit = self._motions[joint.v_index], self._problem.length_scale if joint.prismatic else 1.0
-            reach = np.full(2, self._hand_size / unit if joint.prismatic else HALF_TURN)
+            reach = np.full(2, self.hand_size / unit if joint.prismatic else HALF_TURN)
             if joint.q_size == 1:
                 to_limits = np.array([upper[joint.q_index] - q[joint.q_index], q[joint.q_index] - lower[joint.q_index]])
                 reach = np.where(np.isinf(to_limits), reach, to_limits / unit)

@@ -16,6 +16,7 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand import Body, Hand
 from graspatlas.motions import HandMotions, coupling_rows
 from graspatlas.patches import patch_from_dict
+from graspatlas.pose_guess import PoseGuess
 from graspatlas.problem import Problem
 from graspatlas.problem_files import documents
 from graspatlas.problem_files.faults import ProblemFileError, faults_of_validation, narrowed, one_line
@@ -114,6 +115,10 @@ class _Reading:
             "length_scale": table.length_scale,
             "defaults": table.defaults.model_dump(exclude_none=True),
         }
+        if table.object.pose_guess is not None:
+            with self._within("object", "pose_guess"):
+                guess = PoseGuess.from_dict(table.object.pose_guess.model_dump(exclude_none=True))
+                plain["object"]["pose_guess"] = guess.to_dict()
         if table.hand_motions is not None:
             with self._within("hand_motions"):
                 motions = self._motions(table.hand_motions, joints, moving_joints(full.urdf))

@@ -86,6 +86,15 @@ class CylinderShape(Table):
     """Length along z [m]."""
 
 
+class PoseGuessTable(Table):
+    """About where the object is when it is held."""
+
+    xyz: Vector
+    """Position in the palm's frame [m]."""
+    quat_xyzw: Quaternion | None = None
+    """Rotation; it is normalised. Without it any rotation will do."""
+
+
 class ObjectTable(BodyTable):
     """The object."""
 
@@ -101,6 +110,8 @@ class ObjectTable(BodyTable):
     """A cylinder along z."""
     joint: Literal["free_flyer", "planar"] = "free_flyer"
     """How it moves: in space, or in the palm's x-y plane."""
+    pose_guess: PoseGuessTable | None = None
+    """Where the search for a first grasp starts when x1 is left out."""
 
     @model_validator(mode="after")
     def _one_source(self) -> ObjectTable:

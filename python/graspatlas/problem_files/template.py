@@ -36,6 +36,7 @@ hand:
 {frames}
 
 {object}
+  # pose_guess: {{xyz: [0, 0, 0.1], quat_xyzw: [0, 0, 0, 1]}} # about where it is held, in the palm's frame; without x1
 
 # A contact: a patch of the hand touches a patch of the object, and their normals oppose.
 contacts:
