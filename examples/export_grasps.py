@@ -15,7 +15,7 @@ import graspatlas as ga
 
 def main() -> None:
     """Write the best grasps of a cylinder, read them back as a planner would, and write a joint trajectory."""
-    problem = ga.load_problem("allegro_cylinder")
+    problem = ga.load_problem("allegro_cylinder_3")
     result = ga.optimize(problem)
     folder = Path("out/export_grasps")
     folder.mkdir(parents=True, exist_ok=True)

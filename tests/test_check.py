@@ -322,7 +322,7 @@ def changed(problem, **sides):
 
 def test_patches_that_lie_off_the_shapes_are_pointed_out():
     """Nothing in the equations says so: a patch and the shape that collides are stated apart."""
-    problem = ga.load_problem("allegro_cylinder")
+    problem = ga.load_problem("allegro_cylinder_3")
     right = found(problem, "shapes at x1")
     assert (right.mark, right.text) == (OK, "contact points lie on the collision shapes, to 0.00 mm")
     wall, pad = problem.contacts[1].object, problem.contacts[1].hand

@@ -215,7 +215,7 @@ def test_the_command_line_refines(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 def test_couplings_hold_among_all_feasible_grasps() -> None:
     """A coupling is what the hand is built like: climbing in F lets go of the other frozen motions only."""
-    bundled = ga.load_problem("allegro_cylinder")
+    bundled = ga.load_problem("allegro_cylinder_3")
     couplings, h = bundled.motions.couplings[:3], len(bundled.hand.joints)
     motions = replace(bundled.motions, covariance=np.diag(np.linspace(1.0, 0.1, h)), couplings=couplings)
     problem = replace(bundled, motions=motions)

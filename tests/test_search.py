@@ -361,7 +361,7 @@ def tries_until_near(problem: ga.Problem, guess: ga.PoseGuess, seed: int, dimens
         ("schunk_can", True),
         ("schunk_oil_bottle", True),
         ("planar_hand", True),
-        ("allegro_cylinder", True),
+        ("allegro_cylinder_3", True),
         ("schunk_can", False),
     ],
 )
