@@ -475,6 +475,7 @@ class GraspSystem(AnySystem):
         length_scale: typing.SupportsFloat | typing.SupportsIndex,
         lower: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
         upper: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+        drives: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] | None = None,
     ) -> None: ...
     def grasp_arrays(
         self, X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]

@@ -59,6 +59,10 @@ def refine(result: Result, *, all_motions: bool = False, progress: bool | None =
     A basin is what one local maximum of the index over the charts stands for. Its climb is that of
     :func:`graspatlas.climb`; climbs that end in one place count once. Ctrl-C keeps the climbs that have ended.
 
+    What `all_motions` frees are all hand motions, the couplings of ``HandMotions`` among them: these are a choice, like
+    the motions frozen, made so that k is small. What the mechanism couples is not: joints that mimic others by the
+    ``<mimic>`` tags of the hand's URDF follow their drivers in F too. So state a tendon or a gear in the URDF.
+
     Args:
         result: The result.
         all_motions: Go on from there in all t dimensions of F, no hand motion frozen.

@@ -25,7 +25,7 @@ ForceClosure::ForceClosure(GraspSystem& system, double friction)
   if (system.object_dof() == 0 || system.contact_count() == 0)
     throw Error("force closure needs an object and at least one contact");
   if (!(friction > 0.0) || !std::isfinite(friction)) throw Error("friction must be positive, got " + to_text(friction));
-  J_.resize(3 * system.contact_count(), system.model().hand_v_size());
+  J_.resize(3 * system.contact_count(), system.drive_count());
   Gt_.resize(3 * system.contact_count(), system.object_dof());
   normals_.resize(force_size_, system.contact_count());
 }
