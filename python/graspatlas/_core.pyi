@@ -520,6 +520,7 @@ def force_closure_margins(
     system: GraspSystem,
     X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     friction: typing.SupportsFloat | typing.SupportsIndex,
+    torsional: typing.SupportsFloat | typing.SupportsIndex = 0.0,
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Force-closure margin of each grasp [n]; zero where a grasp is not force-closed. See force_closure.hpp.
@@ -529,6 +530,7 @@ def force_closure_slacks(
     system: GraspSystem,
     X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     friction: typing.SupportsFloat | typing.SupportsIndex,
+    torsional: typing.SupportsFloat | typing.SupportsIndex = 0.0,
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Force-closure margin of each grasp with its sign [n]; -infinity where there are no internal forces. See force_closure.hpp.

@@ -115,7 +115,7 @@ GraspSystem::GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> cont
     const Bound& bound = bounds_[i];
     const auto row = static_cast<Eigen::Index>(i);
     if (bound.joint)
-      B.row(row).head(motion_count_) = bound.sign * motions_.row(bound.tangent);
+      B.row(row).head(motion_count_) = bound.sign / bound.scale * motions_.row(bound.tangent);
     else
       B(row, motion_count_ + object_v_size_ + bound.tangent) = bound.sign;
   }
@@ -129,7 +129,7 @@ void GraspSystem::add_joint_bounds(const std::vector<double>& lower, const std::
     if (joint.q_size != 1) continue;
     const double low = lower[joint.q_index], high = upper[joint.q_index];
     const auto add = [&](double sign, double limit, const char* side) {
-      bounds_.push_back({joint.q_index, joint.v_index, true, sign, limit, 1.0});
+      bounds_.push_back({joint.q_index, joint.v_index, true, sign, limit, joint.prismatic ? length_scale_ : 1.0});
       bound_names_.push_back(std::string(side) + " limit of joint '" + joint.name + "'");
     };
     // A joint that no kept motion moves stays where x1 has it.
