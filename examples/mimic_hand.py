@@ -45,7 +45,7 @@ def main() -> None:
     folder = Path("out/mimic_hand")
     folder.mkdir(parents=True, exist_ok=True)
     result.save(folder / "result.npz")
-    ga.save_picture(result, folder / "grasps.png", width=1200, height=675)
+    ga.save_picture(result, folder / "grasps.png", width=960, height=540)
     ga.export_html(result, folder / "grasps.html")
     print(f"written to {folder}; look at it with: graspatlas view {folder}")
 
