@@ -329,14 +329,7 @@ def test_unknown_problems(name):
         ga.load_problem(name)
 
 
-MIMIC = '<mimic joint="f0" multiplier="2"/>'
 FINGER = chain("f", (0.0, 0.0, 0.1), ["0 0 1", "0 1 0"], 0.05)
-
-
-def test_coupled_joints_are_not_taken_for_independent_ones():
-    head, _, tail = FINGER.rpartition('velocity="1"/>')
-    with pytest.raises(ga.GraspAtlasError, match="mimic"):
-        _ = ga.Hand("h", robot(head + 'velocity="1"/>' + MIMIC + tail)).joints
 
 
 def test_limits_of_a_continuous_joint_are_not_forgotten():

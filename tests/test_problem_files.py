@@ -456,12 +456,6 @@ def test_joints_that_move_and_the_rest_locked():
         ga.Hand.from_urdf(example_robot("allegro_right_hand")).with_joints(["joint_0.0"])
 
 
-def test_a_joint_that_follows_another_may_be_locked():
-    head, _, tail = FINGER.rpartition('velocity="1"/>')
-    coupled = head + 'velocity="1"/><mimic joint="f0" multiplier="2"/>' + tail
-    assert ga.Hand("h", coupled).with_joints(None, {"f2": 0.0}).joints == ("f0", "f1")
-
-
 def test_enlarged_limits():
     text = CAN.replace("  srdf: schunk", "  limits: {index_pip: [0, 1]}\n  enlarge_limits: 0.1\n  srdf: schunk")
     hand, before = read(text).hand, ga.load_problem("schunk_can").hand

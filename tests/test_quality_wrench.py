@@ -276,8 +276,9 @@ def test_indices_of_hands_that_hold_a_sphere_and_a_box(seed: int | None) -> None
 def test_a_pinch_by_two_points_has_no_closure() -> None:
     grasps = held(0.04 * ring(2), ring(2))
     for index in quality.INDICES.values():
-        if index is not quality.joint_centrality:
+        if index not in (quality.joint_centrality, quality.soft_finger_epsilon):
             assert index(grasps)[0] == 0.0
+    assert quality.soft_finger_epsilon(grasps)[0] > 0.0
     assert quality.force_closure_slack(grasps)[0] == -np.inf
 
 

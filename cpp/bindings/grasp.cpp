@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "bindings.hpp"
@@ -57,12 +58,12 @@ py::ssize_t checked_rows(const GraspSystem& system, const DoubleArray& X) {
 
 ArrayTable grasp_arrays(GraspSystem& system, const DoubleArray& X) {
   const py::ssize_t n = checked_rows(system, X), m = system.contact_count(), dof = system.object_dof();
-  const py::ssize_t hand = system.model().hand_v_size();
+  const py::ssize_t drives = system.drive_count();
   Stack hand_points = stack({n, m, 3}), object_points = stack({n, m, 3}), hand_normals = stack({n, m, 3}),
-        object_normals = stack({n, m, 3}), J = stack({n, 3 * m, hand}), G = stack({n, dof, 3 * m}),
+        object_normals = stack({n, m, 3}), J = stack({n, 3 * m, drives}), G = stack({n, dof, 3 * m}),
         T = stack({n, 4, 4});
   std::vector<ContactPoint> contacts(m);
-  RowMatrix J_one(3 * m, hand), Gt_one(3 * m, dof);
+  RowMatrix J_one(3 * m, drives), Gt_one(3 * m, dof);
   using Map3 = Eigen::Map<Eigen::Vector3d>;
   for (py::ssize_t i = 0; i < n; ++i) {
     const double* x = X.data(i, 0);
@@ -79,7 +80,7 @@ ArrayTable grasp_arrays(GraspSystem& system, const DoubleArray& X) {
         joint < 0 ? Eigen::Matrix4d::Identity() : matrix_from(system.model().placement(joint));
     if (dof == 0) continue;
     system.grasp_matrices(x, J_one, Gt_one);
-    Eigen::Map<RowMatrix>(J.mutable_data(i, 0, 0), 3 * m, hand) = J_one;
+    Eigen::Map<RowMatrix>(J.mutable_data(i, 0, 0), 3 * m, drives) = J_one;
     Eigen::Map<RowMatrix>(G.mutable_data(i, 0, 0), dof, 3 * m) = Gt_one.transpose();
   }
   ArrayTable out;
@@ -211,14 +212,15 @@ void bind_grasp(py::module_& module) {
                                                     "The relevant grasps R of a hand and an object.")
       .def(py::init([](std::shared_ptr<Model> model, const std::vector<std::pair<ContactSide, ContactSide>>& sides,
                        const Matrix& motions, double length_scale, const std::vector<double>& lower,
-                       const std::vector<double>& upper) {
+                       const std::vector<double>& upper, const std::optional<Matrix>& drives) {
              std::vector<Contact> contacts;
              for (const auto& [hand, object] : sides) contacts.push_back({hand, object});
+             const int h = model->hand_v_size();
              return std::make_unique<GraspSystem>(std::move(model), std::move(contacts), motions, length_scale, lower,
-                                                  upper);
+                                                  upper, drives.value_or(Matrix::Identity(h, h)));
            }),
            py::arg("model"), py::arg("contacts"), py::arg("motions"), py::arg("length_scale"), py::arg("lower"),
-           py::arg("upper"))
+           py::arg("upper"), py::arg("drives") = py::none())
       .def_property_readonly("n_contacts", &GraspSystem::contact_count, "Number of contacts.")
       .def_property_readonly("n_parameters", &GraspSystem::parameter_count, "Free patch parameters.")
       .def_property_readonly(

@@ -79,13 +79,13 @@ std::shared_ptr<GraspSystem> system_of(GraspSystem& system, int worker) {
 }
 
 /// closure.`measure`(x) for each row of X.
-py::array_t<double> evaluate_closure(GraspSystem& system, const DoubleArray& X, double friction,
+py::array_t<double> evaluate_closure(GraspSystem& system, const DoubleArray& X, double friction, double torsional,
                                      double (ForceClosure::*measure)(const double*)) {
   const double* x = X.data();
   const int size = system.configuration_size();
-  return evaluate_rows(checked_rows(system, X), [&system, x, size, friction, measure](int worker) {
+  return evaluate_rows(checked_rows(system, X), [&system, x, size, friction, torsional, measure](int worker) {
     auto own = system_of(system, worker);
-    auto closure = std::make_shared<ForceClosure>(*own, friction);
+    auto closure = std::make_shared<ForceClosure>(*own, friction, torsional);
     return [own, closure, x, size, measure](std::int64_t row) { return (*closure.*measure)(x + row * size); };
   });
 }
@@ -177,17 +177,17 @@ void bind_quality(py::module_& module) {
       "Ascending semi-axes of the manipulability ellipsoid of each grasp [n x object_dof]; see manipulability.hpp.");
   module.def(
       "force_closure_margins",
-      [](GraspSystem& system, const DoubleArray& X, double friction) {
-        return evaluate_closure(system, X, friction, &ForceClosure::margin);
+      [](GraspSystem& system, const DoubleArray& X, double friction, double torsional) {
+        return evaluate_closure(system, X, friction, torsional, &ForceClosure::margin);
       },
-      py::arg("system"), py::arg("X"), py::arg("friction"),
+      py::arg("system"), py::arg("X"), py::arg("friction"), py::arg("torsional") = 0.0,
       "Force-closure margin of each grasp [n]; zero where a grasp is not force-closed. See force_closure.hpp.");
   module.def(
       "force_closure_slacks",
-      [](GraspSystem& system, const DoubleArray& X, double friction) {
-        return evaluate_closure(system, X, friction, &ForceClosure::slack);
+      [](GraspSystem& system, const DoubleArray& X, double friction, double torsional) {
+        return evaluate_closure(system, X, friction, torsional, &ForceClosure::slack);
       },
-      py::arg("system"), py::arg("X"), py::arg("friction"),
+      py::arg("system"), py::arg("X"), py::arg("friction"), py::arg("torsional") = 0.0,
       "Force-closure margin of each grasp with its sign [n]; -infinity where there are no internal forces. See "
       "force_closure.hpp.");
   bind_wrenches(module);

@@ -475,6 +475,7 @@ class GraspSystem(AnySystem):
         length_scale: typing.SupportsFloat | typing.SupportsIndex,
         lower: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
         upper: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+        drives: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] | None = None,
     ) -> None: ...
     def grasp_arrays(
         self, X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
@@ -519,6 +520,7 @@ def force_closure_margins(
     system: GraspSystem,
     X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     friction: typing.SupportsFloat | typing.SupportsIndex,
+    torsional: typing.SupportsFloat | typing.SupportsIndex = 0.0,
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Force-closure margin of each grasp [n]; zero where a grasp is not force-closed. See force_closure.hpp.
@@ -528,6 +530,7 @@ def force_closure_slacks(
     system: GraspSystem,
     X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     friction: typing.SupportsFloat | typing.SupportsIndex,
+    torsional: typing.SupportsFloat | typing.SupportsIndex = 0.0,
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Force-closure margin of each grasp with its sign [n]; -infinity where there are no internal forces. See force_closure.hpp.

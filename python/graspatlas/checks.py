@@ -17,6 +17,7 @@ from graspatlas.requirements import requirement_name, screen
 from graspatlas.systems import AnySystem
 
 if TYPE_CHECKING:
+    from graspatlas.problem import Problem
     from graspatlas.refinement import Refinement
     from graspatlas.result import Result
 
@@ -220,6 +221,7 @@ def _result_checks(result: Result) -> Iterator[Check]:
         float(np.abs(frozen).max(initial=0.0)),
         RESIDUAL_TOLERANCE,
     )
+    yield from _mimic_checks(problem, atlas.centers, "joints that mimic others are off by [rad or m]")
     start = float(np.abs(system.difference(problem.x1_array, atlas.centers[0])).max())
     yield Check("the first chart is off x1 by [rad or length_scale]", start, 1.0)
     grasps = Grasps(problem, atlas.centers, system)
@@ -250,6 +252,12 @@ def _result_checks(result: Result) -> Iterator[Check]:
         yield from _refinement_checks(result, result.refinement)
 
 
+def _mimic_checks(problem: Problem, X: Array, claim: str) -> Iterator[Check]:
+    """The joints that mimic others are where those drive them, from the tags of the URDF and the joint positions."""
+    if problem.hand.mechanism.mimics:
+        yield Check(claim, float(np.abs(problem.mimic_residual(X)).max(initial=0.0)), RESIDUAL_TOLERANCE)
+
+
 def _refinement_checks(result: Result, refinement: Refinement) -> Iterator[Check]:
     """The local maxima are grasps of the system, meet the requirements, and none is worse than its chart."""
     problem = result.problem
@@ -262,6 +270,8 @@ def _refinement_checks(result: Result, refinement: Refinement) -> Iterator[Check
     if problem.frozen_motions(dimension) > 0:
         frozen = float(np.abs(problem.frozen_residual(refinement.x, dimension)).max(initial=0.0))
         yield Check("frozen hand motions of the refined grasps are off by", frozen, RESIDUAL_TOLERANCE)
+    claim = "joints that mimic others are off in the refined grasps by [rad or m]"
+    yield from _mimic_checks(problem, refinement.x, claim)
     grasps = Grasps(problem, refinement.x, system)
     if result.quality in INDICES:
         again = evaluate(result.quality, grasps)

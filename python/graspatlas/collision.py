@@ -162,7 +162,7 @@ def _joined(problem: Problem) -> tuple[Any, Any]:
     """Model and collision geometry of hand and object in one; the object's shapes sit on the joint named object."""
     import pinocchio as pin
 
-    model = pin.buildModelFromXML(problem.hand.urdf)
+    model = pin.buildModelFromXML(problem.hand.tree)
     geometry = _shapes(problem.hand, model)
     if problem.hand.srdf:
         geometry.addAllCollisionPairs()

@@ -76,7 +76,7 @@ def diagnose(problem: Problem, *, dimension: int | None = None, radius: float | 
     Returns:
         The findings, in the order of the paper. One marked ``"problem"`` means that no atlas can be traced.
     """
-    findings = [_size(problem)]
+    findings = [*_mimics(problem), _size(problem)]
     if problem.x1 is None:
         try:
             problem = with_first_grasp(problem, _searched_dimension(problem, dimension), SEARCH_SECONDS, False)
@@ -119,11 +119,20 @@ def _found(problem: Problem) -> Finding:
     return Finding(OK, "first grasp", text, hint)
 
 
+def _mimics(problem: Problem) -> Iterator[Finding]:
+    mimics = problem.hand.mechanism.mimics
+    if mimics:
+        hint = "by the <mimic> tags of the URDF; they hold on all grasps and count neither as joints nor among the s"
+        yield Finding(OK, "mimic joints", "; ".join(map(str, mimics)), hint)
+
+
 def _size(problem: Problem) -> Finding:
     system = problem.full_system
-    h, w = problem.hand.model.hand_v_size, sum(len(contact.free()) for contact in problem.contacts)
+    mechanism = problem.hand.mechanism
+    h, w = len(mechanism.driven), sum(len(contact.free()) for contact in problem.contacts)
+    which = " that mimic no other" if mechanism.mimics else ""
     text = (
-        f"{h} joints, {system.object_dof} freedoms of the object and {w} free patch parameters: "
+        f"{h} joints{which}, {system.object_dof} freedoms of the object and {w} free patch parameters: "
         f"{system.tangent_size} unknowns; {len(problem.contacts)} contacts: {system.n_equations} equations"
     )
     return Finding(OK, "freedoms", text, "t is unknowns minus rank")
@@ -146,13 +155,15 @@ def _motions(problem: Problem, k: int) -> Iterator[Finding]:
     if motions is None:
         yield Finding(OK, "hand motions", f"none; k = t = {t}, s = 0", "give some to trace fewer dimensions")
         return
-    c, h = len(motions.couplings), len(motions.joints)
+    c, h = len(motions.couplings), len(problem.hand.mechanism.driven)
     coupled = f", {c} of them couplings" if c else ""
     hint = "a smaller k freezes more of them"
     if not motions.covariance.any():
         yield Finding(OK, "hand motions", f"k = {k} freezes s = {s} of {h}{coupled}", "without postures only couplings")
         return
-    variances, kept = motions.variances, motions.variance_kept(s)
+    mechanism = problem.hand.mechanism
+    constrained = mechanism.constrained(motions)
+    variances, kept = constrained.variances, constrained.variance_kept(s + len(mechanism.mimics))
     text = f"k = {k} freezes s = {s} of {h}{coupled}; {100.0 * kept:.4g} % of the variance stay"
     last = h - s
     tied = c < s < h and variances[last - 1] - variances[last] <= SAME_VARIANCE * max(variances[0], 0.0)
@@ -197,9 +208,9 @@ def redundant_joints(problem: Problem) -> list[list[str]]:
     Returns:
         For each independent motion the names of the joints that take part.
     """
-    h = problem.hand.model.hand_v_size
-    motions = _null_space(problem.full_system.evaluate_jacobian(_near_x1(problem))[:, :h])
-    return [[problem.hand.joints[j] for j in _taking_part(motion)] for motion in motions]
+    driven = problem.hand.mechanism.driven
+    motions = _null_space(problem.full_system.evaluate_jacobian(_near_x1(problem))[:, : len(driven)])
+    return [[driven[j] for j in _taking_part(motion)] for motion in motions]
 
 
 def _near_x1(problem: Problem) -> Array:
@@ -228,7 +239,7 @@ def _taking_part(motion: Array) -> list[int]:
 
 
 def _redundancies(problem: Problem) -> Iterator[Finding]:
-    h, groups = problem.hand.model.hand_v_size, redundant_joints(problem)
+    h, groups = len(problem.hand.mechanism.driven), redundant_joints(problem)
     J_x1, J_near = (problem.full_system.evaluate_jacobian(x) for x in (problem.x1_array, _near_x1(problem)))
     extra = len(_null_space(J_x1[:, :h])) - len(groups)
     if groups:

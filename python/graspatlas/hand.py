@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.mimics import Mechanism
 from graspatlas.robot_files import find_file, package_folders, robots_folder
 from graspatlas.tables import checked_table, numbers
-from graspatlas.urdf import joint_limits, lock_joints, moving_joints
+from graspatlas.urdf import joint_limits, joints_of_kind, lock_joints, mimics, moving_joints, with_followers_limited
 
 __all__ = ["Body", "Hand", "robots_folder"]
 
@@ -54,6 +55,11 @@ class Body:
 
     def __post_init__(self) -> None:
         _check_xml(self.name, self.urdf)
+
+    @property
+    def tree(self) -> str:
+        """The URDF as Pinocchio is to read it."""
+        return self.urdf
 
     @classmethod
     def _read(
@@ -189,25 +195,33 @@ class Hand(Body):
         """The hand with only some joints moving, the others locked.
 
         Args:
-            moving: Names of the joints that move; by default all that are not locked.
-            locked: Positions of the joints that do not [rad or m]; 0 where nothing is said.
+            moving: Names of the joints that move, and with them those that mimic them; by default all that are not
+                locked.
+            locked: Positions of the joints that do not [rad or m]; 0 where nothing is said. Those that mimic them are
+                locked too.
 
         Raises:
-            GraspAtlasError: If there is no such joint, a joint is both, or a position lies outside its limits.
+            GraspAtlasError: If there is no such joint, a joint is both, a position lies outside its limits, or a joint
+                mimics another that is not treated like it.
         """
         names, positions = moving_joints(self.urdf), dict(locked or {})
         for name in [*(moving or ()), *positions]:
             if name not in names:
                 raise unknown_name("joint", name, names, f"one of hand '{self.name}' that moves")
+        drivers = {mimic.joint: mimic.driver for mimic in mimics(self.urdf)}
         for name in moving or ():
             if name in positions:
                 raise GraspAtlasError(f"joint '{name}' is among the joints that move and among the locked ones")
+            if moving is not None and drivers.get(name, name) not in moving:
+                raise GraspAtlasError(f"joint '{name}' mimics '{drivers[name]}': name that one among those that move")
         if moving is not None:
-            positions = {name: positions.get(name, 0.0) for name in names if name not in moving}
+            still = [name for name in names if name not in moving and (name not in drivers or name in positions)]
+            positions = {name: positions.get(name, 0.0) for name in still}
         if not positions:
             return self
-        limits = {name: pair for name, pair in self.limits.items() if name not in positions}
-        return replace(self, urdf=lock_joints(self.urdf, positions), limits=limits)
+        urdf = lock_joints(self.urdf, positions)
+        limits = {name: pair for name, pair in self.limits.items() if name in moving_joints(urdf)}
+        return replace(self, urdf=urdf, limits=limits)
 
     def with_limits_enlarged(self, by: float) -> Hand:
         """The hand with all limits of its revolute joints wider, those in ``limits`` as they are.
@@ -236,20 +250,31 @@ class Hand(Body):
     @cached_property
     def model(self) -> _core.Model:
         """The hand alone, as a kinematic tree."""
-        if "<mimic" in self.urdf:
-            raise GraspAtlasError(
-                f"hand '{self.name}' has a joint that mimics another; coupled joints are not supported: drop "
-                "the joint's <mimic> and state the coupling by the hand motions"
-            )
         try:
-            return _core.Model(self.urdf, "none")
+            return _core.Model(self.tree, "none")
         except GraspAtlasError as error:
             raise GraspAtlasError(f"hand '{self.name}' ({self.urdf_path or 'URDF text'}): {error}") from None
+
+    @cached_property
+    def tree(self) -> str:
+        """The URDF as Pinocchio is to read it: what mimics a joint with limits does not go round."""
+        return with_followers_limited(self.urdf)
 
     @property
     def joints(self) -> tuple[str, ...]:
         """Names of the moving joints, in the order of q."""
         return tuple(joint.name for joint in self.model.hand_joints)
+
+    @cached_property
+    def mechanism(self) -> Mechanism:
+        """How the joints depend on those that drive them, by the ``<mimic>`` tags of the URDF.
+
+        Raises:
+            GraspAtlasError: If a tag is wrong, or limits leave a joint no range.
+        """
+        mechanism = Mechanism(self.joints, mimics(self.urdf))
+        mechanism.ranges(self.limits_by_name)
+        return mechanism
 
     @property
     def frames(self) -> tuple[str, ...]:
@@ -275,13 +300,41 @@ class Hand(Body):
         Continuous joints, whose cosine and sine stand in q, have infinite ones.
         """
         lower, upper = np.array(self.model.lower_limits), np.array(self.model.upper_limits)
+        continuous = joints_of_kind(self.urdf, "continuous")
         for joint in self.model.hand_joints:
+            if joint.name in continuous:
+                lower[joint.q_index], upper[joint.q_index] = -np.inf, np.inf
             if joint.q_size == 2:
                 lower[joint.q_index : joint.q_index + 2] = -np.inf
                 upper[joint.q_index : joint.q_index + 2] = np.inf
             if joint.name in self.limits:
                 lower[joint.q_index], upper[joint.q_index] = self.limits[joint.name]
         return lower, upper
+
+    @property
+    def limits_by_name(self) -> dict[str, tuple[float, float]]:
+        """Lower and upper limit of each joint [rad or m]."""
+        lower, upper = self.joint_limits
+        return {j.name: (float(lower[j.q_index]), float(upper[j.q_index])) for j in self.model.hand_joints}
+
+    @property
+    def binding_limits(self) -> tuple[Array, Array]:
+        """The joint limits [nq each] without those that follow from others, because joints mimic others."""
+        lower, upper = (limits.copy() for limits in self.joint_limits)
+        binding = self.mechanism.binding_limits(self.limits_by_name)
+        for joint in self.model.hand_joints:
+            lower[joint.q_index], upper[joint.q_index] = binding[joint.name]
+        return lower, upper
+
+    def joint_steps(self, q0: Array, q1: Array) -> Array:
+        """Step of each joint from q0 [nq] to q1 [nq]: [nv], radians and metres; the shorter way round."""
+        steps = np.zeros(self.model.hand_v_size)
+        for joint in self.model.hand_joints:
+            a, b = (q[joint.q_index : joint.q_index + joint.q_size] for q in (q0, q1))
+            turn = joint.q_size == 2
+            step = np.arctan2(a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]) if turn else b[0] - a[0]
+            steps[joint.v_index] = step
+        return steps
 
     def joint_positions(self, q: NDArray[np.float64]) -> dict[str, float]:
         """Position of each joint with one degree of freedom [rad or m], from q [nq]."""

@@ -33,7 +33,8 @@ class HandMotions:
         covariance: Their covariance [h, h]; only its eigenvectors and the order of its eigenvalues matter.
         couplings: Coefficients [c, h] of joints whose sum keeps its value: a row of index_dip 1 and index_pip -0.7 lets
             the one turn by 0.7 of what the other turns. They are always frozen, before all other motions, and count
-            among the s of eq (12).
+            among the s of eq (12). They narrow R, not F: what the mechanism couples belongs into the hand's URDF, as a
+            ``<mimic>`` tag.
 
     Source: "Global Optimization of Robotic Grasps", Section III, eqs (10) to (13).
     """

@@ -48,6 +48,10 @@ RANK_TRIES = 5
 class Problem:
     """All that defines the set of relevant grasps, and defaults for its atlas.
 
+    Joints that mimic others, by the ``<mimic>`` tags of the hand's URDF, follow their drivers on all feasible grasps F:
+    they add no freedom to t, and are none of the s = t - k hand motions that k freezes. Postures and hand motions may
+    leave them out.
+
     Attributes:
         name: Its name.
         hand: The hand.
@@ -96,6 +100,7 @@ class Problem:
             raise unknown_name("object joint", self.object_joint, OBJECT_JOINTS)
         if self.pose_guess is not None and self.object_joint == "planar":
             self.pose_guess.check_in_plane()
+        self._complete()
         self._check_joints()
         for contact in self.contacts:
             self.hand.frame(contact.frame)
@@ -115,6 +120,19 @@ class Problem:
         checked_table(self.defaults, "defaults", (), DEFAULTS)
         number(self.length_scale, "length_scale")
 
+    def _complete(self) -> None:
+        """Add the joints that mimic others to what leaves them out, and put those stated where they must be."""
+        mechanism = self.hand.mechanism
+        if self.x1 is not None:
+            joints = mechanism.completed(self.x1.joints, f"x1 of problem '{self.name}'")
+            object.__setattr__(self, "x1", replace(self.x1, joints=joints))
+        if self.reference is not None:
+            stated = checked_table(self.reference, "the reference posture", (), None)
+            named = {joint: number(value, f"joint '{joint}' of the reference") for joint, value in stated.items()}
+            object.__setattr__(self, "reference", mechanism.completed(named, "the reference posture"))
+        if self.motions is not None:
+            object.__setattr__(self, "motions", mechanism.completed_motions(self.motions))
+
     def _check_joints(self) -> None:
         for joint in self.hand.model.hand_joints:
             if joint.v_size != 1:
@@ -127,12 +145,13 @@ class Problem:
             raise GraspAtlasError(
                 f"the hand motions and hand '{self.hand.name}' do not have the same joints: see '{odd}'"
             )
+        if self.motions:
+            self.hand.mechanism.constrained(self.motions)
 
     def _check_reference(self) -> None:
         if self.reference is None:
             return
-        named = checked_table(self.reference, "the reference posture", (), None)
-        if not np.isfinite([number(value, f"joint '{name}' of the reference") for name, value in named.items()]).all():
+        if not np.isfinite(list(self.reference.values())).all():
             raise GraspAtlasError("the reference posture holds a number that is not finite")
         q, (lower, upper) = self.reference_array, self.hand.joint_limits
         for joint in self.hand.model.hand_joints:
@@ -176,8 +195,8 @@ class Problem:
 
     @cached_property
     def full_system(self) -> _core.GraspSystem:
-        """The system F of all feasible grasps, no hand motion frozen: eq (9)."""
-        unknowns = self.hand.model.hand_v_size + (6 if self.object_joint == "free_flyer" else 3)
+        """The system F of all feasible grasps, no hand motion frozen: eq (9); joints that mimic others do."""
+        unknowns = len(self.hand.mechanism.driven) + (6 if self.object_joint == "free_flyer" else 3)
         unknowns += sum(len(contact.free()) for contact in self.contacts)
         equations = len(self.contacts) * (5 if self.object_joint == "free_flyer" else 3)
         if equations >= unknowns:
@@ -185,10 +204,10 @@ class Problem:
                 f"problem '{self.name}' has {unknowns} unknowns and {equations} contact equations, which leave "
                 "no freedom: free some patch parameters or drop a contact"
             )
-        return self._system(np.eye(self.hand.model.hand_v_size))
+        return self._system(self.hand.mechanism.A)
 
     @cached_property
-    def _joint_units(self) -> Array:
+    def joint_units(self) -> Array:
         """Joint velocity that counts as one [nv]: a radian, or length_scale for prismatic joints."""
         units = np.ones(self.hand.model.hand_v_size)
         for joint in self.hand.model.hand_joints:
@@ -242,7 +261,7 @@ class Problem:
             raise GraspAtlasError(
                 f"problem '{self.name}' has no hand motions, so its dimension cannot be reduced; use dimension={t}"
             )
-        if s >= self.hand.model.hand_v_size:
+        if s >= len(self.hand.mechanism.driven):
             raise GraspAtlasError(
                 f"dimension {dimension} would freeze {s} hand motions, all that hand '{self.hand.name}' has"
             )
@@ -253,24 +272,25 @@ class Problem:
     def system(self, dimension: int) -> _core.GraspSystem:
         """The system R of relevant grasps of this dimension: eqs (11) to (13)."""
         s = self.frozen_motions(dimension)
+        mechanism = self.hand.mechanism
         if s == 0 or self.motions is None:
-            return self._system(np.eye(self.hand.model.hand_v_size))
-        return self._system(self.motions.reordered(self.hand.joints).kept(s))
+            return self._system(mechanism.A)
+        return self._system(mechanism.constrained(self.motions).kept(s + len(mechanism.mimics)))
 
     def _system(self, motions: Array) -> _core.GraspSystem:
         """The system that keeps these hand motions, columns of joint velocities [nv, p]."""
-        model = _core.Model(self.hand.urdf, self.object_joint)
-        if (self._joint_units != 1.0).any():
-            orthonormal, R = np.linalg.qr(motions / self._joint_units[:, None])
-            motions = self._joint_units[:, None] * orthonormal * np.sign(np.diag(R))
+        model, mechanism = _core.Model(self.hand.tree, self.object_joint), self.hand.mechanism
+        if mechanism.mimics or (self.joint_units != 1.0).any():
+            orthonormal, R = np.linalg.qr(motions / self.joint_units[:, None])
+            motions = self.joint_units[:, None] * orthonormal * np.sign(np.diag(R))
         sides = []
         for contact in self.contacts:
             joint, T = self.hand.frame(contact.frame)
             hand = self._side(joint, T, contact.hand, contact.hand_frozen)
             body = self._side(model.object_joint, np.eye(4), contact.object, contact.frozen)
             sides.append((hand, body))
-        lower, upper = self.hand.joint_limits
-        return _core.GraspSystem(model, sides, motions, self.length_scale, list(lower), list(upper))
+        lower, upper = self.hand.binding_limits
+        return _core.GraspSystem(model, sides, motions, self.length_scale, list(lower), list(upper), drives=mechanism.A)
 
     @staticmethod
     def _side(joint: int, T: Array, patch: Patch, frozen: Mapping[str, float]) -> _core.ContactSide:
@@ -290,13 +310,11 @@ class Problem:
             return self.reference
         if self.x1 is not None:
             return self.x1.joints
-        lower, upper = self.hand.joint_limits
+        mechanism = self.hand.mechanism
         mean = dict(zip(self.motions.joints, self.motions.mean, strict=True)) if self.motions else {}
-        posture = {}
-        for joint in self.hand.model.hand_joints:
-            value, at = float(mean.get(joint.name, 0.0)), joint.q_index
-            posture[joint.name] = value if joint.q_size == 2 else float(np.clip(value, lower[at], upper[at]))
-        return posture
+        ranges = mechanism.ranges(self.hand.limits_by_name)
+        posture = {name: float(np.clip(mean.get(name, 0.0), *ends)) for name, ends in ranges.items()}
+        return mechanism.completed(posture, "the mean posture")
 
     @cached_property
     def reference_array(self) -> Array:
@@ -359,16 +377,24 @@ class Problem:
         rows = np.atleast_2d(np.asarray(X, float))
         if s == 0 or self.motions is None:
             return np.zeros((len(rows), 0))
-        E_s = self.motions.reordered(self.hand.joints).frozen(s)
-        difference, q = self.full_system.difference, self.reference_array
-        nv = self.hand.model.hand_v_size
-        residuals = np.array([(self._joint_units * difference(np.r_[q, x[len(q) :]], x)[:nv]) @ E_s for x in rows])
+        mechanism, q = self.hand.mechanism, self.reference_array
+        E_s = mechanism.constrained(self.motions).frozen(s + len(mechanism.mimics))
+        residuals = np.array([self.hand.joint_steps(q, x[: len(q)]) @ E_s for x in rows])
         # A continuous joint may have gone round: of all its turns, the one that fits.
         turning = [joint.v_index for joint in self.hand.model.hand_joints if joint.q_size == 2 and joint.v_size == 1]
         turns = np.array(list(product((0, -1, 1), repeat=len(turning)))) * 2.0 * np.pi
         candidates = residuals[:, None, :] + turns @ E_s[turning]
         fitting = np.abs(candidates).max(axis=2).argmin(axis=1)
         return np.asarray(candidates[np.arange(len(rows)), fitting])
+
+    def mimic_residual(self, X: ArrayLike) -> Array:
+        """q_joint - multiplier q_driver - offset of the joints that mimic others, at grasps X: [n, m], zero on F."""
+        size = self.hand.model.hand_q_size
+        named = [self.hand.joint_positions(x[:size]) for x in np.atleast_2d(np.asarray(X, float))]
+        joints = self.hand.joints
+        return self.hand.mechanism.residual(
+            np.array([[q[name] for name in joints] for q in named]).reshape(-1, len(joints))
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """The problem as plain data that :meth:`from_dict` reads, with the text of its URDFs."""

@@ -45,6 +45,7 @@ __all__ = [
     "min_weight",
     "quality_name",
     "smallest_semi_axis",
+    "soft_finger_epsilon",
 ]
 
 Array = NDArray[np.float64]
@@ -131,27 +132,32 @@ def smallest_semi_axis(grasps: Grasps, length_unit: float = Grasps.LENGTH_UNIT) 
 
 
 @batched
-def force_closure_margin(grasps: Grasps, friction: float = 0.5) -> Array:
+def force_closure_margin(grasps: Grasps, friction: float = 0.5, torsional: float = 0.0) -> Array:
     r"""Distance of the contact forces from their friction cones that internal forces allow; 0 without force closure.
 
     .. math:: \max_{G f = 0,\; \sum_i n_i^\top f_i = 1} \; \min_i \;
         \frac{\mu \, n_i^\top f_i - \| f_i - n_i n_i^\top f_i \|}{\sqrt{1 + \mu^2}}
 
     The margin has no unit: normal forces add up to one. It is exact for round cones (a second-order cone programme).
+    Soft fingers also resist a torque :math:`\tau_i` about the normal, up to an ellipsoidal friction limit surface: with
+    torsional friction :math:`\gamma` the norm is that of the tangential force and :math:`\mu \tau_i / \gamma` together.
 
     Args:
         grasps: The grasps.
         friction: Coefficient of friction mu.
+        torsional: Torsional friction gamma [m], the largest torque about the normal that a normal force of one allows;
+            0 for hard fingers, of which it takes three to close a grasp in space.
 
     Returns:
         One value for each grasp [n].
 
     Source: Force closure as in V.-D. Nguyen, "Constructing Force-Closure Grasps", IJRR 1988, the paper's reference 14.
     """
-    return np.asarray(_core.force_closure_margins(grasps.system, grasps.x, checked_positive(friction, "friction")))
+    mu = checked_positive(friction, "friction")
+    return np.asarray(_core.force_closure_margins(grasps.system, grasps.x, mu, number(torsional, "torsional")))
 
 
-def force_closure_slack(grasps: Grasps, friction: float = 0.5) -> Array:
+def force_closure_slack(grasps: Grasps, friction: float = 0.5, torsional: float = 0.0) -> Array:
     """The force-closure margin with its sign: negative where internal forces exist but leave their cones.
 
     It has the formula of :func:`force_closure_margin` and equals it where that is positive, so that it serves as a
@@ -160,12 +166,14 @@ def force_closure_slack(grasps: Grasps, friction: float = 0.5) -> Array:
     Args:
         grasps: The grasps.
         friction: Coefficient of friction mu.
+        torsional: Torsional friction [m]; 0 for hard fingers.
 
     Returns:
         One value for each grasp [n]; minus infinity where G has lost rank, or where no internal forces press on the
         object at all.
     """
-    return np.asarray(_core.force_closure_slacks(grasps.system, grasps.x, checked_positive(friction, "friction")))
+    mu = checked_positive(friction, "friction")
+    return np.asarray(_core.force_closure_slacks(grasps.system, grasps.x, mu, number(torsional, "torsional")))
 
 
 def _contacts(grasps: Grasps) -> tuple[Array, Array]:
@@ -192,9 +200,9 @@ def _length(grasps: Grasps, length_unit: float | None) -> float:
     return length
 
 
-def _wrenches(grasps: Grasps, friction: float, edges: int, length_unit: float | None) -> Array:
+def _wrenches(grasps: Grasps, friction: float, edges: int, length_unit: float | None, torsional: float = 0.0) -> Array:
     length = _length(grasps, length_unit)
-    return wrenches.contact_wrenches(*_contacts(grasps), friction, edges, length, _planar(grasps))
+    return wrenches.contact_wrenches(*_contacts(grasps), friction, edges, length, _planar(grasps), torsional)
 
 
 @batched
@@ -230,6 +238,39 @@ def ferrari_canny_epsilon(
         axes = wrenches.contact_axes(*_contacts(grasps), _length(grasps, length_unit))
         return wrenches.round_ball_radius(axes, friction)
     return wrenches.ball_radius(_wrenches(grasps, friction, 8 if edges is None else edges, length_unit))
+
+
+@batched
+def soft_finger_epsilon(
+    grasps: Grasps,
+    friction: float = 0.5,
+    torsional: float = 0.005,
+    length_unit: float | None = None,
+    edges: int = 8,
+) -> Array:
+    """The epsilon of :func:`ferrari_canny_epsilon` with soft fingers, the index for grippers with two flat pads.
+
+    Two hard fingers never close a grasp in space: nothing resists a torque about the line through them. A pad that is
+    pressed flat does, up to a torque about its normal of `torsional` times the normal force. The friction limit surface
+    is linearised, so the value is a little below that of the ellipsoid.
+
+    Args:
+        grasps: The grasps.
+        friction: Coefficient of friction mu.
+        torsional: Torsional friction [m]: about mu times two thirds of the radius of the patch of contact.
+        length_unit: The length that divides torques [m]; see :func:`ferrari_canny_epsilon`.
+        edges: Edges of the friction pyramids.
+
+    Returns:
+        One value for each grasp [n].
+
+    Raises:
+        GraspAtlasError: If an argument is out of its range.
+
+    Source: R. D. Howe, M. R. Cutkosky, "Practical Force-Motion Models for Sliding Manipulation", IJRR 1996, for the
+    friction limit surface; under even pressure a disc of radius a resists 2/3 mu a for each unit of normal force.
+    """
+    return wrenches.ball_radius(_wrenches(grasps, friction, edges, length_unit, torsional))
 
 
 @batched
@@ -352,6 +393,7 @@ INDICES: dict[str, Callable[[Grasps], Array]] = {
         smallest_semi_axis,
         force_closure_margin,
         ferrari_canny_epsilon,
+        soft_finger_epsilon,
         ferrari_canny_volume,
         min_weight,
         grasp_isotropy,

@@ -59,9 +59,12 @@ def refine(result: Result, *, all_motions: bool = False, progress: bool | None =
     A basin is what one local maximum of the index over the charts stands for. Its climb is that of
     :func:`graspatlas.climb`; climbs that end in one place count once. Ctrl-C keeps the climbs that have ended.
 
+    What `all_motions` frees are the hand motions that k froze. What couples joints stays: the couplings of
+    ``HandMotions``, and joints that mimic others by the ``<mimic>`` tags of the hand's URDF.
+
     Args:
         result: The result.
-        all_motions: Go on from there in all t dimensions of F, no hand motion frozen but the couplings.
+        all_motions: Go on from there in F, no hand motion frozen but the couplings.
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
     Returns:

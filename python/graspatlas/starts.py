@@ -107,9 +107,9 @@ class Starts:
 
     def _joint_steps(self, x: NDArray[np.float64]) -> Array:
         """From the reference posture to that of x [rad or length_scale]; the shorter way round."""
-        nv = self._problem.hand.model.hand_v_size
-        full = self._problem.full_system
-        return np.asarray(full.difference(self._reference, x)[:nv])
+        problem = self._problem
+        nq = problem.hand.model.hand_q_size
+        return problem.hand.joint_steps(self._reference[:nq], x[:nq]) / problem.joint_units
 
     def _kept_motions(self) -> Array:
         """The hand motions that are kept, as columns of joint steps [nv, p]."""
@@ -125,7 +125,7 @@ class Starts:
         lower, upper = hand.joint_limits
         A, b = [], []
         for joint in hand.model.hand_joints:
-            row, unit = self._motions[joint.v_index], self._problem.length_scale if joint.prismatic else 1.0
+            row, unit = self._motions[joint.v_index], self._problem.joint_units[joint.v_index]
             reach = np.full(2, self.hand_size / unit if joint.prismatic else HALF_TURN)
             if joint.q_size == 1:
                 to_limits = np.array([upper[joint.q_index] - q[joint.q_index], q[joint.q_index] - lower[joint.q_index]])

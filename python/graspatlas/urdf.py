@@ -11,22 +11,28 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.mimics import Mimic, read_mimics
 
 __all__ = [
     "box_urdf",
     "cylinder_urdf",
     "joint_limits",
+    "joints_of_kind",
     "lock_joints",
     "mesh_urdf",
+    "mimics",
     "moving_joints",
     "root_link",
     "sphere_urdf",
     "velocity_limits",
+    "with_followers_limited",
 ]
 
 Array = NDArray[np.float64]
 #: Joints that move with one degree of freedom.
 TURNING, SLIDING = ("revolute", "continuous"), ("prismatic",)
+#: Two positions of a locked joint that differ by less are the same [rad or m].
+SAME = 1e-6
 
 
 def moving_joints(urdf: str) -> tuple[str, ...]:
@@ -36,6 +42,16 @@ def moving_joints(urdf: str) -> tuple[str, ...]:
         urdf: Text of a URDF.
     """
     return tuple(str(joint.get("name")) for joint in _joints(ElementTree.fromstring(urdf)))
+
+
+def joints_of_kind(urdf: str, kind: str) -> set[str]:
+    """Names of the joints of a type, such as ``continuous``.
+
+    Args:
+        urdf: Text of a URDF.
+        kind: The type.
+    """
+    return {str(joint.get("name")) for joint in _joints(ElementTree.fromstring(urdf)) if joint.get("type") == kind}
 
 
 def joint_limits(urdf: str) -> dict[str, tuple[float, float]]:
@@ -78,23 +94,74 @@ def root_link(urdf: str) -> str:
     return next((name for link in root.findall("link") if (name := str(link.get("name"))) not in children), "")
 
 
+def mimics(urdf: str) -> tuple[Mimic, ...]:
+    """The joints that mimic others; see :func:`graspatlas.mimics.read_mimics`.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    return read_mimics(ElementTree.fromstring(urdf)) if "<mimic" in urdf else ()
+
+
+def with_followers_limited(urdf: str) -> str:
+    """The URDF with the continuous joints made revolute that mimic joints with limits: they never go round.
+
+    Their limits are written as 0 and mean nothing.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    plain = {mimic.joint for mimic in mimics(urdf) if not mimic.turns}
+    root = ElementTree.fromstring(urdf)
+    changed = [joint for joint in _joints(root) if joint.get("name") in plain and joint.get("type") == "continuous"]
+    for joint in changed:
+        joint.set("type", "revolute")
+        for limit in joint.findall("limit"):
+            joint.remove(limit)
+        ElementTree.SubElement(joint, "limit", {"lower": "0", "upper": "0", "effort": "0", "velocity": "0"})
+    return ElementTree.tostring(root, encoding="unicode") if changed else urdf
+
+
 def lock_joints(urdf: str, positions: Mapping[str, float]) -> str:
-    """The URDF with some joints fixed where they stand at given positions.
+    """The URDF with some joints fixed where they stand at given positions, and with them those that mimic them.
 
     Args:
         urdf: Text of a URDF.
         positions: Positions of the joints to lock, by name [rad or m].
 
     Raises:
-        GraspAtlasError: If there is no such joint that moves, or a position lies outside its limits.
+        GraspAtlasError: If there is no such joint that moves, a position lies outside its limits, or a joint mimics
+            another that is not locked or has it elsewhere.
     """
     root = ElementTree.fromstring(urdf)
     joints = {str(joint.get("name")): joint for joint in _joints(root)}
-    for name, position in positions.items():
+    for name in positions:
         if name not in joints:
             raise unknown_name("joint", name, joints, "one that moves")
+    for name, position in _with_followers(positions, mimics(urdf)).items():
         _lock(joints[name], float(position))
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def _with_followers(positions: Mapping[str, float], followers: Iterable[Mimic]) -> dict[str, float]:
+    """Positions of joints to lock, those that mimic them included."""
+    full = dict(positions)
+    for mimic in followers:
+        if mimic.driver not in positions:
+            if mimic.joint in positions:
+                raise GraspAtlasError(
+                    f"joint '{mimic.joint}' mimics '{mimic.driver}' and stands still only with it: lock "
+                    f"'{mimic.driver}' instead"
+                )
+            continue
+        must = mimic.position(float(positions[mimic.driver]))
+        if not abs(float(positions.get(mimic.joint, must)) - must) <= SAME:
+            raise GraspAtlasError(
+                f"joint '{mimic.joint}' is locked at {float(positions[mimic.joint]):g}, but it mimics: {mimic} = "
+                f"{must:g}; lock '{mimic.driver}' alone"
+            )
+        full[mimic.joint] = must
+    return full
 
 
 def _joints(root: ElementTree.Element) -> Iterable[ElementTree.Element]:

@@ -82,8 +82,12 @@ def contact_wrenches(
     edges: int = 8,
     length_unit: float = 1.0,
     planar: bool = False,
+    torsional: float = 0.0,
 ) -> Array:
     """Wrenches of the edges of the friction pyramids, normal forces being one.
+
+    A soft finger also resists being turned about the normal. Its friction limit surface is linearised: the hull of the
+    pyramid's edges and of the normal force with the largest torque either way.
 
     Args:
         points: Contact points, seen from the point that torques are about [n, m, 3], metres.
@@ -93,9 +97,11 @@ def contact_wrenches(
             In the plane a cone has two edges, whatever this says.
         length_unit: The length that divides torques [m].
         planar: Whether forces stay in the x-y plane and the torque is about z.
+        torsional: Torsional friction [m]: largest torque about the normal, of a normal force of one; 0 for hard
+            fingers. It plays no part in the plane.
 
     Returns:
-        Wrenches [n, m edges, 6], or [n, 2 m, 3] in the plane.
+        Wrenches [n, m edges, 6], two more for each contact of soft fingers; or [n, 2 m, 3] in the plane.
 
     Raises:
         GraspAtlasError: If an argument is out of its range or of another shape.
@@ -110,6 +116,12 @@ def contact_wrenches(
         angles = 2.0 * np.pi * np.arange(edges) / edges
         corners = np.stack([np.ones(edges), mu * np.cos(angles), mu * np.sin(angles)], axis=1)
     wrenches = corners @ axes
+    if not 0.0 <= number(torsional, "torsional") < np.inf:
+        raise GraspAtlasError(f"torsional must be a number of at least 0, got {torsional!r}")
+    if torsional > 0.0 and not planar:
+        normal = axes[:, :, :1]
+        turn = np.concatenate([np.zeros_like(normal[..., 3:]), torsional / length_unit * normal[..., :3]], axis=-1)
+        wrenches = np.concatenate([wrenches, normal + turn, normal - turn], axis=2)
     return np.ascontiguousarray(
         wrenches.reshape(len(wrenches), wrenches.shape[1] * wrenches.shape[2], wrenches.shape[3])
     )

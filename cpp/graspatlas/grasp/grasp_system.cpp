@@ -74,7 +74,8 @@ int GraspSystem::embedding_size(const Model& model, const std::vector<Contact>& 
 }
 
 GraspSystem::GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> contacts, const Matrix& motions,
-                         double length_scale, const std::vector<double>& lower, const std::vector<double>& upper)
+                         double length_scale, const std::vector<double>& lower, const std::vector<double>& upper,
+                         const Matrix& drives)
     : System(model->q_size() + count_free(contacts),
              static_cast<int>(motions.cols()) + graspatlas::object_v_size(*model) + count_free(contacts),
              equations_per_contact(*model) * static_cast<int>(contacts.size()),
@@ -83,6 +84,7 @@ GraspSystem::GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> cont
       contacts_(std::move(contacts)),
       motions_(motions),
       coordinates_((motions.transpose() * motions).ldlt().solve(motions.transpose()).transpose()),
+      drives_(drives),
       all_motions_(motions.rows() == motions.cols() && motions.isIdentity(0.0)),
       motion_count_(static_cast<int>(motions.cols())),
       object_v_size_(graspatlas::object_v_size(*model_)),
@@ -92,6 +94,9 @@ GraspSystem::GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> cont
       velocity_(model_->v_size()) {
   if (motions.rows() != model_->hand_v_size())
     throw Error("the hand motions have " + std::to_string(motions.rows()) + " rows, the hand has " +
+                std::to_string(model_->hand_v_size()) + " joint velocities");
+  if (drives.rows() != model_->hand_v_size())
+    throw Error("the drives have " + std::to_string(drives.rows()) + " rows, the hand has " +
                 std::to_string(model_->hand_v_size()) + " joint velocities");
   if (!(length_scale > 0.0) || !std::isfinite(length_scale))
     throw Error("length_scale must be positive, got " + to_text(length_scale));
@@ -110,7 +115,7 @@ GraspSystem::GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> cont
     const Bound& bound = bounds_[i];
     const auto row = static_cast<Eigen::Index>(i);
     if (bound.joint)
-      B.row(row).head(motion_count_) = bound.sign * motions_.row(bound.tangent);
+      B.row(row).head(motion_count_) = bound.sign / bound.scale * motions_.row(bound.tangent);
     else
       B(row, motion_count_ + object_v_size_ + bound.tangent) = bound.sign;
   }
@@ -124,7 +129,7 @@ void GraspSystem::add_joint_bounds(const std::vector<double>& lower, const std::
     if (joint.q_size != 1) continue;
     const double low = lower[joint.q_index], high = upper[joint.q_index];
     const auto add = [&](double sign, double limit, const char* side) {
-      bounds_.push_back({joint.q_index, joint.v_index, true, sign, limit, 1.0});
+      bounds_.push_back({joint.q_index, joint.v_index, true, sign, limit, joint.prismatic ? length_scale_ : 1.0});
       bound_names_.push_back(std::string(side) + " limit of joint '" + joint.name + "'");
     };
     // A joint that no kept motion moves stays where x1 has it.
@@ -382,7 +387,8 @@ void GraspSystem::grasp_matrices(const double* x, Eigen::Ref<RowMatrix> J, Eigen
     place_side(contact.object, w, object);
     for (int v : model_->support(contact.hand.joint)) {
       const Eigen::Map<const Eigen::Vector3d> linear(model_->velocity(v)), angular(model_->velocity(v) + 3);
-      J.block<3, 1>(row, v) = linear + angular.cross(hand.point);
+      const Eigen::Vector3d moved = linear + angular.cross(hand.point);
+      for (Eigen::Index d = 0; d < drives_.cols(); ++d) J.block<3, 1>(row, d) += drives_(v, d) * moved;
     }
     const Eigen::Vector3d arm = object.point - origin;
     if (model_->object_kind() == ObjectJoint::free_flyer) {

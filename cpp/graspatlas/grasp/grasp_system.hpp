@@ -48,9 +48,11 @@ class GraspSystem : public System {
  public:
   /// Columns of `motions` [hand_v_size x p] are the joint velocities of the hand motions kept, each of length one in
   /// the metric of the tangent space: orthonormal for revolute joints; the identity keeps them all. Limits
-  /// [hand_q_size] apply to joints with one number each; infinite ones are none.
+  /// [hand_q_size] apply to joints with one number each; infinite ones are none. Columns of `drives`
+  /// [hand_v_size x d] are the joint velocities that the unit velocity of each driven joint makes: the identity unless
+  /// joints mimic others.
   GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> contacts, const Matrix& motions, double length_scale,
-              const std::vector<double>& lower, const std::vector<double>& upper);
+              const std::vector<double>& lower, const std::vector<double>& upper, const Matrix& drives);
 
   void residual(const double* x, double* R) override;
   void linearize(const double* x, double* R, double* J) override;
@@ -72,11 +74,12 @@ class GraspSystem : public System {
 
   /// Contact points and normals at x [contact_count].
   void contact_points(const double* x, ContactPoint* out);
-  /// J [3m x hand_v_size]: joint velocities to velocities of the contact points, and Gt [3m x object dof],
+  /// J [3m x drive_count]: velocities of the driven joints to those of the contact points, and Gt [3m x object dof],
   /// the grasp matrix transposed: the object's velocity (linear at its origin, then angular; world axes) to
   /// those of the points.
   void grasp_matrices(const double* x, Eigen::Ref<RowMatrix> J, Eigen::Ref<RowMatrix> Gt);
   int object_dof() const;
+  int drive_count() const { return static_cast<int>(drives_.cols()); }
 
  private:
   struct Bound {
@@ -109,6 +112,7 @@ class GraspSystem : public System {
   std::vector<Contact> contacts_;
   RowMatrix motions_;      // columns are the hand motions kept, in joint velocities
   RowMatrix coordinates_;  // its pseudo-inverse, transposed: joint velocities along the motions
+  RowMatrix drives_;       // columns are the joint velocities that each driven joint makes
   bool all_motions_;
   int motion_count_, object_v_size_, rows_per_contact_;
   const int* rows_;  // of the entries of a contact, those that are equations

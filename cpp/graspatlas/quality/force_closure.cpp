@@ -16,18 +16,22 @@ constexpr double kHopeless = -1.0;  // a barrier that starts this far outside th
 
 }  // namespace
 
-ForceClosure::ForceClosure(GraspSystem& system, double friction)
+ForceClosure::ForceClosure(GraspSystem& system, double friction, double torsional)
     : system_(system),
       friction_(friction),
-      force_size_(system.object_dof() == 3 ? 2 : 3),
+      torsional_(torsional),
+      directions_(system.object_dof() == 3 ? 2 : 3),
+      force_size_(directions_ + (directions_ == 3 && torsional > 0.0 ? 1 : 0)),
       points_(system.contact_count()),
       cones_(system.contact_count()) {
   if (system.object_dof() == 0 || system.contact_count() == 0)
     throw Error("force closure needs an object and at least one contact");
   if (!(friction > 0.0) || !std::isfinite(friction)) throw Error("friction must be positive, got " + to_text(friction));
-  J_.resize(3 * system.contact_count(), system.model().hand_v_size());
+  if (!(torsional >= 0.0) || !std::isfinite(torsional))
+    throw Error("torsional friction must not be negative, got " + to_text(torsional));
+  J_.resize(3 * system.contact_count(), system.drive_count());
   Gt_.resize(3 * system.contact_count(), system.object_dof());
-  normals_.resize(force_size_, system.contact_count());
+  normals_.setZero(force_size_, system.contact_count());
 }
 
 double ForceClosure::margin(const double* x) { return internal_forces(x) ? std::max(widest_margin(false), 0.0) : 0.0; }
@@ -39,12 +43,17 @@ bool ForceClosure::internal_forces(const double* x) {
   system_.grasp_matrices(x, J_, Gt_);
   system_.contact_points(x, points_.data());
   const int contacts = system_.contact_count(), dof = system_.object_dof();
-  for (int c = 0; c < contacts; ++c) normals_.col(c) = -points_[c].object_normal.head(force_size_);
+  for (int c = 0; c < contacts; ++c) normals_.col(c).head(directions_) = -points_[c].object_normal.head(directions_);
   const Eigen::Index forces = static_cast<Eigen::Index>(contacts) * force_size_;
   if (forces < dof + 1) return false;
   equations_.resize(forces, dof + 1);
   for (int c = 0; c < contacts; ++c) {
-    equations_.block(c * force_size_, 0, force_size_, dof) = Gt_.block(3 * c, 0, force_size_, dof);
+    equations_.block(c * force_size_, 0, directions_, dof) = Gt_.block(3 * c, 0, directions_, dof);
+    if (force_size_ > directions_) {
+      auto turning = equations_.row(c * force_size_ + directions_);
+      turning.setZero();
+      turning.segment<3>(3) = (torsional_ / friction_) * normals_.col(c).head<3>().transpose();
+    }
     equations_.block(c * force_size_, dof, force_size_, 1) = normals_.col(c);
   }
   // Torques in units of the grasp's size, so that one tolerance serves all rows.

@@ -7,7 +7,7 @@
 
 namespace graspatlas {
 
-/// Force closure of grasps with hard fingers: contact forces f_i within friction cones, G mapping them to the wrench.
+/// Force closure of grasps: contact forces f_i within friction cones, G mapping them to the wrench.
 ///
 /// A grasp is force-closed when G has full rank and some internal forces, G f = 0, lie strictly inside all cones. The
 /// margin says how strictly: with normal forces that add up to one,
@@ -17,10 +17,17 @@ namespace graspatlas {
 /// the distance from the nearest cone's surface. It is a small second-order cone programme in the null space of G,
 /// which a barrier method solves with the cones as they are, not as pyramids. Where all internal forces leave their
 /// cones the same maximum is negative, and says how far the best of them are outside.
+///
+/// Soft fingers also resist being turned about the normal, by a torque tau_i with the friction limit surface
+///
+///   |f_i - (n_i . f_i) n_i|^2 / mu^2 + tau_i^2 / gamma^2 <= (n_i . f_i)^2,
+///
+/// an ellipsoid. With mu tau_i / gamma as one more component of the contact force it is the same round cone, of a
+/// dimension more; so the margin is that above. A torsional friction gamma of 0 is a hard finger.
 class ForceClosure {
  public:
-  /// `friction` is mu > 0.
-  ForceClosure(GraspSystem& system, double friction);
+  /// `friction` is mu > 0, `torsional` is gamma >= 0 [m]; in the plane nothing turns about a normal.
+  ForceClosure(GraspSystem& system, double friction, double torsional);
 
   /// The margin at x; zero when the grasp is not force-closed.
   double margin(const double* x);
@@ -29,7 +36,7 @@ class ForceClosure {
   double slack(const double* x);
 
  private:
-  using Force = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;  // in the plane it has two components
+  using Force = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1>;  // see force_size_
 
   /// |tangential z + tangential_0| <= axial . z + axial_0: a cone as a function of the unknowns z = (c, t).
   struct Cone {
@@ -48,8 +55,9 @@ class ForceClosure {
   bool newton_step(double weight);
 
   GraspSystem& system_;
-  double friction_;
-  int force_size_;  // components of a contact force: three, in the plane two
+  double friction_, torsional_;
+  int directions_;  // of a contact force: three, in the plane two
+  int force_size_;  // its components: these, and of soft fingers the torque about the normal times mu / gamma
   RowMatrix J_, Gt_;
   Matrix normals_;     // force_size x contacts: into the object
   Matrix basis_;       // of the internal forces with no total normal force, one a column

@@ -20,7 +20,7 @@ Manipulability::Manipulability(GraspSystem& system, double length_unit) : system
     throw Error("manipulability needs an object and at least one contact");
   if (!(length_unit > 0.0) || !std::isfinite(length_unit))
     throw Error("length_unit must be positive, got " + to_text(length_unit));
-  J_.resize(3 * system.contact_count(), system.model().hand_v_size());
+  J_.resize(3 * system.contact_count(), system.drive_count());
   Gt_.resize(3 * system.contact_count(), system.object_dof());
 }
 

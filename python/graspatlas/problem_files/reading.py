@@ -96,7 +96,7 @@ class _Reading:
             hand = full.with_joints(table.hand.joints, table.hand.locked)
             if table.hand.enlarge_limits:
                 hand = hand.with_limits_enlarged(table.hand.enlarge_limits)
-            joints = hand.joints
+            _ = hand.mechanism
         with self._within("object"):
             body = self._object(table.object)
         for i, contact in enumerate(stated["contacts"]):
@@ -121,7 +121,7 @@ class _Reading:
                 plain["object"]["pose_guess"] = guess.to_dict()
         if table.hand_motions is not None:
             with self._within("hand_motions"):
-                motions = self._motions(table.hand_motions, joints, moving_joints(full.urdf))
+                motions = self._motions(table.hand_motions, hand, moving_joints(full.urdf))
                 plain["hand_motions"] = motions.to_dict()
         for i, requirement in enumerate(table.requirements):
             with self._within("requirements", i):
@@ -170,11 +170,12 @@ class _Reading:
         urdf = mesh_urdf(name, f"package://{path.parent.name}/{path.name}", scales)
         return Body(name, urdf, package_dirs=(folder,), package_paths=(folder,))
 
-    def _motions(self, table: MotionsTable, joints: tuple[str, ...], known: tuple[str, ...]) -> HandMotions:
+    def _motions(self, table: MotionsTable, hand: Hand, known: tuple[str, ...]) -> HandMotions:
         """Hand motions of the joints that move; what is said of locked ones is left out."""
+        joints = hand.joints
         if table.samples is None and table.mean is None and table.covariance is None and table.couplings:
             return HandMotions.from_couplings(table.couplings, joints)
-        motions = self._statistics(table, joints)
+        motions = hand.mechanism.completed_motions(self._statistics(table, joints))
         for name in motions.joints:
             if name not in known:
                 raise unknown_name("joint", name, known, "one of the hand's that move")

@@ -94,7 +94,7 @@ def problem_template(urdf: str, object_file: str | None = None, *, folder: Path 
         GraspAtlasError: If the hand cannot be read.
     """
     hand, source = _hand(urdf, folder)
-    joints = list(hand.joints)
+    joints = list(hand.mechanism.driven)
     head = _HEAD.format(
         blank=FILL_IN,
         name=f"my_{hand.name}",
@@ -105,7 +105,7 @@ def problem_template(urdf: str, object_file: str | None = None, *, folder: Path 
         object=_object(object_file, folder),
         contacts="\n".join([_contact()] * 3).rstrip("\n"),
     )
-    posture = "\n".join(f"#     {name}: {value:.4g}" for name, value in zip(joints, _middle(hand), strict=True))
+    posture = "\n".join(f"#     {name}: {value:.4g}" for name, value in _middle(hand).items())
     return head + _TAIL.format(first=joints[0], second=joints[-1], posture=posture)
 
 
@@ -144,19 +144,21 @@ def _object(path: str | None, folder: Path | None) -> str:
 
 
 def _joint_lines(hand: Hand) -> list[str]:
-    lower, upper = hand.joint_limits
-    width = max(map(len, hand.joints))
-    return [
-        f"  #   {joint.name:{width}}  [{lower[joint.q_index]:.4g}, {upper[joint.q_index]:.4g}]"
-        for joint in hand.model.hand_joints
-    ]
+    width, followers = max(map(len, hand.joints)), hand.mechanism.followers
+    lines = []
+    for name, (lower, upper) in hand.limits_by_name.items():
+        mimic = followers.get(name)
+        follows = f", mimics: {mimic}" if mimic else ""
+        lines.append(f"  #   {name:{width}}  [{lower:.4g}, {upper:.4g}]{follows}")
+    if followers:
+        lines.append("  # Joints that mimic others follow them by themselves: x1 and hand_motions may leave them out.")
+    return lines
 
 
-def _middle(hand: Hand) -> list[float]:
-    """The middle of each joint's limits, 0 where there are none."""
-    lower, upper = hand.joint_limits
-    middle = np.where(np.isfinite(lower) & np.isfinite(upper), 0.5 * (lower + upper), 0.0)
-    return [float(middle[joint.q_index]) for joint in hand.model.hand_joints]
+def _middle(hand: Hand) -> dict[str, float]:
+    """The middle of where each joint can be that mimics no other, 0 where that has no two ends."""
+    ranges = hand.mechanism.ranges(hand.limits_by_name)
+    return {name: 0.5 * (low + high) if np.isfinite(high - low) else 0.0 for name, (low, high) in ranges.items()}
 
 
 def _rows(names: Iterable[str], width: int = 100) -> list[str]:

@@ -52,7 +52,7 @@ class BodyShapes:
         import pinocchio as pin
 
         try:
-            model = pin.buildModelFromXML(body.urdf)
+            model = pin.buildModelFromXML(body.tree)
             for kind in (pin.VISUAL, pin.COLLISION):
                 geometry = pin.buildGeomFromUrdfString(model, body.urdf, kind, package_dirs=list(body.package_dirs))
                 if geometry.ngeoms:

@@ -54,12 +54,14 @@ def coordinated_motions(grasp: Grasp) -> tuple[Array, Array]:
 
     Returns:
         The object's twists [6, c] (linear, angular) and the least joint velocities that cause them [h, c]; the columns
-        of the second are orthonormal.
+        of the second are orthonormal. There are none where contacts leave the object loose, as two points do.
     """
     G = grasp.G.copy()
     linear = 3 if len(G) == 6 else 2
     size = max(float(np.abs(grasp.J).max(initial=0.0)), 1e-12)
     G[linear:] /= size  # rotations as lengths, so that ranks do not depend on the unit of length
+    if np.linalg.matrix_rank(G, tol=RANK_TOLERANCE * np.linalg.norm(G)) < len(G):
+        return np.zeros((len(G), 0)), np.zeros((grasp.J.shape[1], 0))
     J_inverse = np.linalg.pinv(grasp.J, rcond=RANK_TOLERANCE)
     unreached = G.T - grasp.J @ (J_inverse @ G.T)
     _, singular, Vt = np.linalg.svd(unreached)

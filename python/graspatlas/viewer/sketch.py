@@ -53,7 +53,7 @@ def bone_length(problem: Problem) -> float:
     """Mean length of the hand's bones at x1, metres."""
     import pinocchio as pin
 
-    model = pin.buildModelFromXML(problem.hand.urdf)
+    model = pin.buildModelFromXML(problem.hand.tree)
     lines = _skeleton(problem, model, problem.x1_array[: model.nq])[1]
     return float(np.mean([np.linalg.norm(end - start) for start, end in lines]))
 

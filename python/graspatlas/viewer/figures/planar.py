@@ -85,7 +85,7 @@ def _chains(problem: Problem, grasp: Grasp) -> list[Array]:
     """Joints and fingertip of each finger, from the palm outwards [j, 2], millimetres."""
     import pinocchio as pin
 
-    model = pin.buildModelFromXML(problem.hand.urdf)
+    model = pin.buildModelFromXML(problem.hand.tree)
     data = model.createData()
     pin.forwardKinematics(model, data, np.asarray(grasp.q, float))
     chains = []
