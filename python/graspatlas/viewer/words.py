@@ -12,6 +12,9 @@ from graspatlas.viewer.scene import COLOURS, Colour, Exhibit
 
 __all__ = ["Caption", "caption", "film_title", "index_name", "legend", "subtitle"]
 
+#: Motions below this are rounding [mm per rad].
+ROUNDING = 1e-6
+
 
 @dataclass(frozen=True)
 class Caption:
@@ -30,11 +33,13 @@ class Caption:
 
 def caption(result: Result, exhibit: Exhibit) -> Caption:
     """What is written beside one of the grasps."""
-    reach = ", ".join(f"{1000.0 * axis:.3g}" for axis in exhibit.semi_axes[: 3 if len(exhibit.grasp.G) == 6 else 2])
+    axes = [1000.0 * axis for axis in exhibit.semi_axes[: 3 if len(exhibit.grasp.G) == 6 else 2]]
+    reach = ", ".join(f"{axis if axis > ROUNDING else 0.0:.3g}" for axis in axes)
+    moves = max(axes) > ROUNDING
     return Caption(
         title=f"{exhibit.name.capitalize()} grasp",
         quality=f"{index_name(result)} {exhibit.grasp.quality:.3g}",
-        motion=f"object moves {reach} mm per rad",
+        motion=f"object moves {reach} mm per rad" if moves else "the joints do not move the object",
     )
 
 
