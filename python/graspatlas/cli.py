@@ -20,12 +20,13 @@ from graspatlas.checkpoints import CheckpointFolder
 from graspatlas.components import Components, SearchStatus, find_components
 from graspatlas.errors import GraspAtlasError
 from graspatlas.exit_status import FAILED, INTERRUPTED, MISUSE
+from graspatlas.files import writable_folder
 from graspatlas.optimizer import optimize
 from graspatlas.problem_commands import add_problem_commands
 from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.quality import INDICES, quality_name
 from graspatlas.requirements import REQUIREMENTS, parse_requirement
-from graspatlas.result import Result, writable_folder
+from graspatlas.result import Result
 from graspatlas.result_commands import add_result_commands
 
 __all__ = ["main"]

@@ -1,4 +1,4 @@
-"""Files that are either written completely or not at all, and tables in them."""
+"""Files that are either written completely or not at all, tables in them, and folders for them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from graspatlas.errors import GraspAtlasError
 
-__all__ = ["replaced", "write_csv"]
+__all__ = ["replaced", "writable_folder", "write_csv"]
 
 
 @contextmanager
@@ -45,6 +45,22 @@ def replaced(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     finally:
         if os.path.exists(temporary):
             os.unlink(temporary)
+
+
+def writable_folder(path: str | os.PathLike[str]) -> Path:
+    """Make a folder, and make sure that files can be written there.
+
+    Raises:
+        GraspAtlasError: If they cannot.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise GraspAtlasError(f"cannot write to folder '{folder}': {error.strerror or error}; choose another") from None
+    return folder
 
 
 def write_csv(path: str | os.PathLike[str], columns: Mapping[str, Iterable[Any]]) -> None:

@@ -1,15 +1,12 @@
-"""What `optimize` returns: grasps, atlas, qualities; stored in one file, and able to verify itself."""
+"""What `optimize` returns: grasps, atlas and qualities, able to verify themselves."""
 
 from __future__ import annotations
 
-import json
 import os
-import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,21 +19,15 @@ from graspatlas.grasps import Grasp, Grasps
 from graspatlas.problem import Problem
 from graspatlas.quality import Quality, evaluate, quality_name
 from graspatlas.refinement import Refinement
-from graspatlas.requirements import Require, parse_requirement, requirement_name
-from graspatlas.tables import number
+from graspatlas.requirements import Require
+from graspatlas.result_files import read_result, save_result
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-__all__ = ["Result", "load_result", "writable_folder"]
+__all__ = ["Result", "load_result"]
 
 Array = NDArray[np.float64]
-
-FORMAT = "graspatlas result"
-FORMAT_VERSION = 1
-
-_REFINEMENT_FLAGS = ("all_motions", "complete")
-_REFINEMENT_ARRAYS = tuple(f.name for f in fields(Refinement) if f.name not in _REFINEMENT_FLAGS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,44 +298,7 @@ class Result:
         Raises:
             GraspAtlasError: If the file cannot be written.
         """
-        target = Path(path)
-        header = {
-            "format": FORMAT,
-            "version": FORMAT_VERSION,
-            "problem": self.problem.to_dict(),
-            "dimension": self.dimension,
-            "radius": self.atlas.radius,
-            "epsilon": self.atlas.epsilon,
-            "status": self.status.name,
-            "seconds": self.atlas.seconds,
-            "quality": quality_name(self.quality),
-            "quality_seconds": self.quality_seconds,
-            "requirements": [requirement_name(r) for r in self.requirements],
-            "refused": dict(self.refused),
-            "others": list(self.others),
-        }
-        extra: dict[str, Any] = {f"other_{i}": values for i, values in enumerate(self.others.values())}
-        if self.refinement is not None:
-            header["refinement"] = {name: getattr(self.refinement, name) for name in _REFINEMENT_FLAGS}
-            extra |= {f"refined_{name}": getattr(self.refinement, name) for name in _REFINEMENT_ARRAYS}
-        temporary = None
-        try:
-            descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-            with os.fdopen(descriptor, "wb") as stream:
-                np.savez(  # compression would take longer than the atlas
-                    stream,
-                    header=json.dumps(header),
-                    qualities=self.qualities,
-                    feasible=self.feasible,
-                    **extra,
-                    **self.atlas.to_arrays(),
-                )
-            os.chmod(temporary, 0o644)
-            os.replace(temporary, target)
-        except OSError as error:
-            if temporary is not None and os.path.exists(temporary):
-                os.unlink(temporary)
-            raise GraspAtlasError(f"cannot write '{target}': {error.strerror or error}") from None
+        save_result(self, path)
 
 
 def load_result(path: str | os.PathLike[str]) -> Result:
@@ -356,108 +310,4 @@ def load_result(path: str | os.PathLike[str]) -> Result:
     Raises:
         GraspAtlasError: If the file is missing, damaged, or of another version.
     """
-    source = Path(path)
-    if source.is_dir():
-        source = source / "result.npz"
-    try:
-        with open(source, "rb") as stream:
-            header, arrays = _read(stream)
-    except FileNotFoundError:
-        raise GraspAtlasError(
-            f"result '{source}' does not exist; 'graspatlas optimize ... --output FOLDER' writes one"
-        ) from None
-    except OSError as error:
-        raise GraspAtlasError(f"cannot read result '{source}': {error.strerror or error}") from None
-    except Exception:  # a damaged archive fails in many ways, none of which executes anything
-        raise GraspAtlasError(f"'{source}' is damaged or not a graspatlas result; compute it again") from None
-    if header.get("version") != FORMAT_VERSION:
-        raise GraspAtlasError(
-            f"result '{source}' has version {header.get('version')}, this graspatlas reads {FORMAT_VERSION}"
-        )
-    return _from_parts(header, arrays, source)
-
-
-def _read(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Header and arrays of a result file."""
-    with np.load(stream, allow_pickle=False) as file:
-        arrays = {name: file[name] for name in file.files}
-    header = json.loads(str(arrays.pop("header")))
-    if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise ValueError("its header is another one")
-    return header, arrays
-
-
-def _from_parts(header: Mapping[str, Any], arrays: dict[str, Any], source: Path) -> Result:
-    try:
-        problem = Problem.from_dict(header["problem"])
-        qualities, feasible = arrays.pop("qualities"), arrays.pop("feasible")
-        others = {str(name): arrays.pop(f"other_{i}") for i, name in enumerate(header.get("others", []))}
-        refinement = _refinement(header.get("refinement"), arrays, problem)
-        atlas = Atlas(
-            system=problem.system(header["dimension"]),
-            radius=number(header["radius"], "radius"),
-            epsilon=number(header["epsilon"], "epsilon"),
-            status=Status[header["status"]],
-            seconds=number(header["seconds"], "seconds"),
-            **arrays,
-        )
-        atlas.check_arrays()
-        if qualities.shape != (atlas.n_charts,) or feasible.shape != qualities.shape or feasible.dtype != bool:
-            raise GraspAtlasError("qualities and feasible need one entry a chart")
-        for values in (qualities, *others.values()):
-            if values.shape != qualities.shape or values.dtype.kind != "f" or np.isnan(values).any():
-                raise GraspAtlasError("qualities must be numbers, one a chart")
-        if not atlas.radius > 0.0 or not 0.0 < atlas.epsilon < 1.0 or not isinstance(header["quality"], str):
-            raise GraspAtlasError("its header holds a value that cannot be")
-        return Result(
-            problem=problem,
-            atlas=atlas,
-            quality=header["quality"],
-            qualities=qualities,
-            quality_seconds=number(header["quality_seconds"], "quality_seconds"),
-            requirements=tuple(_stored_requirement(str(text)) for text in header["requirements"]),
-            feasible=feasible,
-            refused={str(name): int(count) for name, count in header["refused"].items()},
-            others=others,
-            refinement=refinement,
-        )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise GraspAtlasError(f"result '{source}' is damaged ({error}); compute it again") from None
-
-
-def _refinement(flags: Mapping[str, Any] | None, arrays: dict[str, Any], problem: Problem) -> Refinement | None:
-    """The refinement of a result file, taken out of its arrays."""
-    if flags is None:
-        return None
-    parts = {name: arrays.pop(f"refined_{name}") for name in _REFINEMENT_ARRAYS}
-    p = len(parts["x"])
-    shapes = {"x": (p, problem.full_system.configuration_size), "qualities": (p,), "starts": (p,), "converged": (p,)}
-    kinds = {"x": "f", "qualities": "f", "starts": "i", "converged": "b"}
-    for name, array in parts.items():
-        if p == 0 or array.shape != shapes[name] or array.dtype.kind != kinds[name] or not np.isfinite(array).all():
-            raise GraspAtlasError(f"the refined {name} have shape {array.shape} and type {array.dtype}")
-    return Refinement(**parts, all_motions=bool(flags["all_motions"]), complete=bool(flags["complete"]))
-
-
-def _stored_requirement(text: str) -> Require | str:
-    """The requirement of a name; the name alone of a callable, which is not stored."""
-    try:
-        return parse_requirement(text)
-    except GraspAtlasError:
-        return text
-
-
-def writable_folder(path: str | os.PathLike[str]) -> Path:
-    """Make a folder, and make sure that files can be written there.
-
-    Raises:
-        GraspAtlasError: If they cannot.
-    """
-    folder = Path(path)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise GraspAtlasError(f"cannot write to folder '{folder}': {error.strerror or error}; choose another") from None
-    return folder
+    return Result(**read_result(path))

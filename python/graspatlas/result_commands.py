@@ -13,11 +13,11 @@ import numpy as np
 from graspatlas.data_frames import FRAME_ENDINGS, save_frame
 from graspatlas.errors import GraspAtlasError
 from graspatlas.exit_status import FAILED, INTERRUPTED
-from graspatlas.files import replaced
+from graspatlas.files import replaced, writable_folder
 from graspatlas.pareto import knee, pareto_front, values_of
 from graspatlas.paths import GraspPath, shortest_path
 from graspatlas.quality import quality_name
-from graspatlas.result import Result, load_result, writable_folder
+from graspatlas.result import Result, load_result
 from graspatlas.sampling import Samples, densify
 from graspatlas.timing import speed_limits
 

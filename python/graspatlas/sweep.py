@@ -24,12 +24,13 @@ from tqdm import tqdm
 
 from graspatlas import __version__
 from graspatlas.errors import GraspAtlasError
+from graspatlas.files import writable_folder
 from graspatlas.optimizer import optimize
 from graspatlas.problem import Problem
 from graspatlas.problems import load_problem
 from graspatlas.quality import find_index
 from graspatlas.requirements import parse_requirement
-from graspatlas.result import Result, writable_folder
+from graspatlas.result import Result
 
 __all__ = ["ROWS", "Run", "Sweep", "run_sweep"]
 
