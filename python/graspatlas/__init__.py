@@ -15,7 +15,7 @@ from graspatlas.local_search import Climb, Peak, climb, local_maxima, peaks_of
 from graspatlas.motions import HandMotions
 from graspatlas.optimizer import build_atlas, optimize
 from graspatlas.pareto import pareto_front
-from graspatlas.paths import GraspPath, Path, shortest_path
+from graspatlas.paths import GraspPath, Path
 from graspatlas.pose_guess import PoseGuess
 from graspatlas.problem import Problem
 from graspatlas.problems import bundled_problems, load_problem
@@ -26,6 +26,7 @@ from graspatlas.requirements import CollisionFree, ForceClosure, JointMargin
 from graspatlas.result import Result, load_result
 from graspatlas.sampling import Samples, densify
 from graspatlas.search import find_grasps
+from graspatlas.shortest_paths import shortest_path
 from graspatlas.systems import System
 from graspatlas.viewer import export_html, save_picture, view
 

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from graspatlas.atlas import Atlas, Status
 from graspatlas.checks import CheckReport, check_result
@@ -19,7 +19,7 @@ from graspatlas.grasps import Grasp, Grasps
 from graspatlas.problem import Problem
 from graspatlas.quality import Quality, evaluate, quality_name
 from graspatlas.refinement import Refinement
-from graspatlas.requirements import Require
+from graspatlas.requirements import Require, requirement_name, screen
 from graspatlas.result_files import read_result, save_result
 
 if TYPE_CHECKING:
@@ -183,6 +183,23 @@ class Result:
                 f"chart {chart!r} does not exist; the atlas has charts 0 to {self.atlas.n_charts - 1}"
             )
         return int(chart)
+
+    def meets(self, X: ArrayLike) -> NDArray[np.bool_]:
+        """Which configurations meet the requirements [n].
+
+        Args:
+            X: Configurations [n, configuration_size].
+
+        Raises:
+            GraspAtlasError: If a requirement was a callable, which is not stored with a result.
+        """
+        lost = [r for r in self.requirements if isinstance(r, str)]
+        if lost:
+            raise GraspAtlasError(
+                f"requirement '{requirement_name(lost[0])}' is a callable that was not stored with the result; run "
+                "optimize again in this program, or leave out feasible=True"
+            )
+        return screen([r for r in self.requirements if not isinstance(r, str)], Grasps(self.problem, X))[0]
 
     def save_grasps(
         self,

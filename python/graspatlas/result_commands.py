@@ -15,10 +15,11 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.exit_status import FAILED, INTERRUPTED
 from graspatlas.files import replaced, writable_folder
 from graspatlas.pareto import knee, pareto_front, values_of
-from graspatlas.paths import GraspPath, shortest_path
+from graspatlas.paths import GraspPath
 from graspatlas.quality import quality_name
 from graspatlas.result import Result, load_result
 from graspatlas.sampling import Samples, densify
+from graspatlas.shortest_paths import shortest_path
 from graspatlas.timing import speed_limits
 
 __all__ = ["add_result_commands"]
