@@ -335,8 +335,12 @@ FINGER = chain("f", (0.0, 0.0, 0.1), ["0 0 1", "0 1 0"], 0.05)
 
 def test_coupled_joints_are_not_taken_for_independent_ones():
     head, _, tail = FINGER.rpartition('velocity="1"/>')
-    with pytest.raises(ga.GraspAtlasError, match="mimic"):
-        _ = ga.Hand("h", robot(head + 'velocity="1"/>' + MIMIC + tail)).joints
+    coupled = robot(head + 'velocity="1"/>' + MIMIC + tail)
+    with pytest.raises(ga.GraspAtlasError, match=r"mimic.*couplings: \[\{\w+: 1, f0: -2\}\]"):
+        _ = ga.Hand("h", coupled).joints
+    with pytest.raises(ga.GraspAtlasError, match="multiplier that is no number"):
+        _ = ga.Hand("h", coupled.replace('multiplier="2"', 'multiplier="two"')).joints
+    assert ga.Hand("h", coupled.replace(MIMIC, f"<!-- {MIMIC} -->")).joints
 
 
 def test_limits_of_a_continuous_joint_are_not_forgotten():

@@ -16,7 +16,7 @@ from graspatlas import _core
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.robot_files import find_file, package_folders, robots_folder
 from graspatlas.tables import checked_table, numbers
-from graspatlas.urdf import joint_limits, lock_joints, moving_joints
+from graspatlas.urdf import joint_limits, lock_joints, mimicking_joints, moving_joints
 
 __all__ = ["Body", "Hand", "robots_folder"]
 
@@ -236,10 +236,12 @@ class Hand(Body):
     @cached_property
     def model(self) -> _core.Model:
         """The hand alone, as a kinematic tree."""
-        if "<mimic" in self.urdf:
+        if mimics := mimicking_joints(self.urdf):
+            lines = ", ".join(f"{{{joint}: 1, {other}: {-factor:g}}}" for joint, other, factor in mimics)
             raise GraspAtlasError(
-                f"hand '{self.name}' has a joint that mimics another; coupled joints are not supported: drop "
-                "the joint's <mimic> and state the coupling by the hand motions"
+                f"hand '{self.name}' has joints that mimic others: take <mimic> out of a copy of the URDF, and give "
+                f"the problem file 'hand_motions: {{couplings: [{lines}]}}' and a reference or x1 that fulfils them; "
+                "or lock these joints"
             )
         try:
             return _core.Model(self.urdf, "none")

@@ -18,6 +18,7 @@ __all__ = [
     "joint_limits",
     "lock_joints",
     "mesh_urdf",
+    "mimicking_joints",
     "moving_joints",
     "root_link",
     "sphere_urdf",
@@ -139,6 +140,29 @@ def _triple(text: str | None, default: Sequence[float]) -> Array:
 
 def _words(values: Iterable[float]) -> str:
     return " ".join(repr(float(value)) for value in values)
+
+
+def mimicking_joints(urdf: str) -> list[tuple[str, str, float]]:
+    """Joints that mimic another, as (name, name of the other, how many times as far it turns).
+
+    Args:
+        urdf: Text of the URDF; one that is no XML has none.
+    """
+    if "<mimic" not in urdf:
+        return []
+    try:
+        root = ElementTree.fromstring(urdf)
+    except ElementTree.ParseError:
+        return []
+    pairs = [(joint.get("name", ""), joint.find("mimic")) for joint in root.iter("joint")]
+    try:
+        return [
+            (name, mimic.get("joint", ""), float(mimic.get("multiplier", "1")))
+            for name, mimic in pairs
+            if mimic is not None
+        ]
+    except ValueError as error:
+        raise GraspAtlasError(f"a <mimic> of the URDF has a multiplier that is no number: {error}") from None
 
 
 def sphere_urdf(name: str, radius: float) -> str:
