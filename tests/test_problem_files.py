@@ -537,8 +537,11 @@ def test_robots_of_robot_descriptions(monkeypatch, tmp_path):
     assert folders == tuple(str(tmp_path / f) for f in ("cache/models", "cache/models/hand", "cache"))
     with pytest.raises(ga.GraspAtlasError, match="did you mean 'my_hand_description'"):
         described_robot("my_hand")
-    with pytest.raises(ga.GraspAtlasError, match="cannot fetch 'broken_description': no network"):
+    with pytest.raises(ga.GraspAtlasError, match=r"cannot fetch 'broken_description': no network; .*path of a URDF"):
         described_robot("broken_description")
+    (package / "far_description.py").write_text(f"raise OSError('git fetch -v {'x' * 300}: fatal: no such host')\n")
+    with pytest.raises(ga.GraspAtlasError, match=r"cannot fetch 'far_description': no such host; .*path of a URDF"):
+        described_robot("far_description")
     for name in ("robot_descriptions", "robot_descriptions.my_hand_description"):
         monkeypatch.delitem(sys.modules, name, raising=False)
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
+from graspatlas.collision_shapes import convex_hull, convex_solid, is_mesh, thinner
 from graspatlas.errors import GraspAtlasError
 
 if TYPE_CHECKING:
@@ -21,6 +22,8 @@ __all__ = ["CollisionChecker"]
 
 #: Before the names of the object's shapes.
 OBJECT = "object/"
+#: After the names of shapes that are thinner than those of the hand.
+THINNER = "/thinner"
 #: Distances are as exact as this, so that optimisers can differentiate them; depths are not [m].
 DISTANCE_TOLERANCE = 1e-10
 #: Radius of the ball that stands for a point [m].
@@ -34,7 +37,9 @@ class CollisionChecker:
     """Tells whether a grasp is free of collision: hand with itself, and hand with object.
 
     Pairs of links that the hand's SRDF lists may touch. The links that carry a contact touch the object; they may sink
-    into it by `touch_depth`, since a collision shape only approximates the surface.
+    into it by `touch_depth`, since a collision shape only approximates the surface. Meshes that bound a convex solid
+    are solid. Other meshes of a link with a contact count by their convex hulls where they meet the object; those of an
+    object are surfaces, and what touches them is made thinner by `touch_depth`.
 
     Args:
         problem: The problem; hand and object need collision shapes.
@@ -50,7 +55,7 @@ class CollisionChecker:
         import pinocchio as pin
 
         self._pin = pin
-        self._model, self._geometry = _joined(problem)
+        self._model, self._geometry = _joined(problem, touch_depth)
         self._data = self._model.createData()
         self._geometry_data = pin.GeometryData(self._geometry)
         touching = _touching_joints(self._model, problem)
@@ -59,7 +64,8 @@ class CollisionChecker:
             in_object = [shape.name.startswith(OBJECT) for shape in shapes]
             touches = in_object == [False, True] and shapes[0].parentJoint in touching
             request = coal.CollisionRequest()
-            request.security_margin = -touch_depth if touches else clearance
+            depth = 0.0 if shapes[0].name.endswith(THINNER) else touch_depth
+            request.security_margin = -depth if touches else clearance
             self._geometry_data.collisionRequests[i] = request
             self._geometry_data.distanceRequests[i].gjk_tolerance = DISTANCE_TOLERANCE
         pairs = range(len(self._geometry.collisionPairs))
@@ -78,7 +84,7 @@ class CollisionChecker:
         for pair, result in zip(self._geometry.collisionPairs, self._geometry_data.collisionResults, strict=True):
             if result.isCollision():
                 first, second = (self._geometry.geometryObjects[i].name for i in (pair.first, pair.second))
-                return first, second
+                return first.removesuffix(THINNER), second
         return None
 
     def free(self, X: ArrayLike) -> NDArray[np.bool_]:
@@ -137,8 +143,8 @@ class CollisionChecker:
             points: The points in the palm's frame [n, 3], metres.
 
         Returns:
-            Distance of each point from the nearest shape [n], metres: negative inside of shapes other than meshes, and
-            infinite where there is no shape.
+            Distance of each point from the nearest shape [n], metres: negative inside, but for meshes that are not
+            convex, and infinite where there is no shape.
         """
         import coal
 
@@ -158,7 +164,7 @@ class CollisionChecker:
         return out
 
 
-def _joined(problem: Problem) -> tuple[Any, Any]:
+def _joined(problem: Problem, touch_depth: float) -> tuple[Any, Any]:
     """Model and collision geometry of hand and object in one; the object's shapes sit on the joint named object."""
     import pinocchio as pin
 
@@ -170,16 +176,36 @@ def _joined(problem: Problem) -> tuple[Any, Any]:
     else:
         geometry.addAllCollisionPairs()
         _drop_adjacent(model, geometry)
-    in_hand = geometry.ngeoms
+    touching = _touching_joints(model, problem)
+    in_hand = list(enumerate(geometry.geometryObjects.tolist()))
     joint = pin.JointModelFreeFlyer() if problem.object_joint == "free_flyer" else pin.JointModelPlanar()
     object_joint = model.addJoint(0, joint, pin.SE3.Identity(), "object")
     body = _shapes(problem.object, pin.buildModelFromXML(problem.object.urdf))
     for shape in body.geometryObjects:
         placed = pin.GeometryObject(OBJECT + shape.name, object_joint, 0, shape.placement, shape.geometry)
         index = geometry.addGeometryObject(placed)
-        for other in range(in_hand):
-            geometry.addCollisionPair(pin.CollisionPair(other, index))
+        for other, of_link in in_hand:
+            may_touch = of_link.parentJoint in touching and (is_mesh(of_link.geometry) or is_mesh(shape.geometry))
+            added = _may_touch(of_link, is_mesh(shape.geometry), touch_depth) if may_touch else of_link
+            if added is not None:
+                first = geometry.addGeometryObject(added) if may_touch else other
+                geometry.addCollisionPair(pin.CollisionPair(first, index))
     return model, geometry
+
+
+def _may_touch(shape: Any, surface: bool, touch_depth: float) -> Any | None:
+    """A stand-in for a link's shape, where coal knows no depth of the pair: its hull, thinner where it meets a surface.
+
+    None when nothing is left of it.
+    """
+    import pinocchio as pin
+
+    hull, name = convex_hull(shape.geometry), shape.name
+    if is_mesh(hull):
+        raise GraspAtlasError(f"the collision mesh '{name}' touches the object and is flat; give it some thickness")
+    if surface:
+        hull, name = thinner(hull, touch_depth), name + THINNER
+    return None if hull is None else pin.GeometryObject(name, shape.parentJoint, 0, shape.placement, hull)
 
 
 def _shapes(body: Body, model: Any) -> Any:
@@ -192,6 +218,8 @@ def _shapes(body: Body, model: Any) -> Any:
         raise GraspAtlasError(f"collision shapes of '{body.name}' cannot be read: {reason}") from None
     if geometry.ngeoms == 0:
         raise GraspAtlasError(f"'{body.name}' has no collision shape; give its URDF <collision> elements")
+    for shape in geometry.geometryObjects:
+        shape.geometry = convex_solid(shape.geometry)
     return geometry
 
 

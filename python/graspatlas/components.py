@@ -25,7 +25,7 @@ from graspatlas.problem import Problem
 from graspatlas.quality import Quality
 from graspatlas.requirements import Require
 from graspatlas.result import Result
-from graspatlas.search import GraspSearch, deadline_after, search_bar
+from graspatlas.search import MAX_SPECIAL, GraspSearch, deadline_after, search_bar
 
 __all__ = ["Components", "SearchStatus", "find_components"]
 
@@ -211,7 +211,10 @@ def _trace_all(
             if x is None:
                 late = time.perf_counter() > traced.deadline
                 return SearchStatus.TIME_LIMIT if late else SearchStatus.NO_GRASP
-            traced.take(search.problem, x)
+            if not traced.take(search, x) and traced.special >= MAX_SPECIAL:
+                if traced.results:
+                    return SearchStatus.NO_GRASP
+                traced.trace(search.problem.at(x))  # says why no atlas can grow
             bar.set_postfix(grasps=search.found, components=len(traced.results), refresh=False)
     return SearchStatus.COVERED
 
@@ -223,18 +226,26 @@ class _Tracer:
         self.options, self.deadline, self.progress = options, deadline, progress
         self.results: list[Result] = []
         self.hits: list[int] = []
-        self.covered = self.holes = 0
+        self.covered = self.holes = self.special = 0
         self.interrupted = False
 
-    def take(self, problem: Problem, x: Array) -> None:
-        """Count a grasp that was found to the component that covers it, or trace its component."""
+    def take(self, search: GraspSearch, x: Array) -> bool:
+        """Count a grasp that was found to the component that covers it, or trace its component.
+
+        False for a special grasp that none covers: no atlas can grow from it.
+        """
         for i, result in enumerate(self.results):
             if _covers(result.atlas, x):
                 self.hits[i] += 1
                 self.covered += 1
-                return
-        self.covered = 0
-        self.hits[self.trace(problem.at(x))] += 1
+                self.special = 0
+                return True
+        if not search.is_regular(x):
+            self.special += 1
+            return False
+        self.covered = self.special = 0
+        self.hits[self.trace(search.problem.at(x))] += 1
+        return True
 
     def trace(self, problem: Problem) -> int:
         """Trace the component of a problem's x1; its number."""

@@ -38,6 +38,8 @@ OUTWARDS = 1e-3
 LITTLE_VARIANCE = 0.9
 #: Two variances closer than this share of the largest are the same.
 SAME_VARIANCE = 1e-9
+#: A first grasp turned by more than this from the guess is pointed out: something is not where it was thought [rad].
+FAR_FROM_GUESS = 0.8
 #: How long to look for a first grasp where none is given [s].
 SEARCH_SECONDS = 10.0
 #: How long an atlas may grow for the estimate of its size [s], and how often its radius may be doubled.
@@ -116,6 +118,9 @@ def _found(problem: Problem) -> Finding:
         metres, angle = guess.offset(x1.object_xyz, Rotation.from_quat(x1.object_quat_xyzw))
         text += f", {1000.0 * metres:.3g} mm from the pose guess"
         text += f" and turned by {np.degrees(angle):.3g} degrees" if guess.quat_xyzw else ""
+        if guess.quat_xyzw and angle > FAR_FROM_GUESS:
+            hint = "a normal, an axis or a frozen u may be wrong; or state a reference, the hand about to close"
+            return Finding(NOTE, "first grasp", text, hint)
     return Finding(OK, "first grasp", text, hint)
 
 
@@ -187,13 +192,32 @@ def _contacts(problem: Problem) -> Iterator[Finding]:
 def _limits(problem: Problem) -> Iterator[Finding]:
     system = problem.full_system
     slack = np.asarray(system.slack(problem.x1_array))
-    near = [f"{name} ({s:.3g})" for name, s in zip(system.bound_names, slack, strict=True) if s < NEAR_LIMIT]
+    named = [_with_contact(name, problem) for name in system.bound_names]
+    near = [f"{name} ({s:.3g})" for name, s in zip(named, slack, strict=True) if s < NEAR_LIMIT]
     if not near:
         text = f"x1 is at least {slack.min():.3g} from all {len(slack)}" if len(slack) else "there are none"
         yield Finding(OK, "limits", text, "in radians, and lengths / length_scale")
         return
     hint = "an atlas grows from there one way only; that is all right unless x1 was meant to lie inside"
     yield Finding(NOTE, "limits", f"x1 is at the {', the '.join(near)}", hint)
+
+
+def _with_contact(bound: str, problem: Problem) -> str:
+    """The name of a bound, its patch parameter said by contact and side in place of its number in x."""
+    of, found, number = bound.partition("patch parameter ")
+    if not found:
+        return bound
+    names = [
+        f"{name} of the {side}'s patch at {contact.frame}"
+        for contact in problem.contacts
+        for side, patch, frozen in (
+            ("hand", contact.hand, contact.hand_frozen),
+            ("object", contact.object, contact.frozen),
+        )
+        for name in patch.parameters
+        if name not in frozen
+    ]
+    return of + names[int(number)]
 
 
 def redundant_joints(problem: Problem) -> list[list[str]]:

@@ -86,6 +86,10 @@ def example_robot(name: str) -> str:
     return PACKAGE + found[name].relative_to(share).as_posix()
 
 
+#: Longest reason that is quoted [characters].
+REASON = 200
+
+
 def described_robot(name: str) -> tuple[str, tuple[str, ...]]:
     """The URDF of a robot of robot_descriptions, which fetches it on first use, and its package folders.
 
@@ -106,9 +110,18 @@ def described_robot(name: str) -> tuple[str, tuple[str, ...]]:
     try:
         module = importlib.import_module(f"robot_descriptions.{name}")
     except Exception as error:  # git, network and file errors of many kinds
-        reason = " ".join(str(error).split())[:200]
-        raise GraspAtlasError(f"robot_descriptions cannot fetch '{name}': {reason}") from None
+        raise GraspAtlasError(
+            f"robot_descriptions cannot fetch '{name}': {_last_words(error)}; it clones a repository on first "
+            "use: try again with a connection, or give the path of a URDF instead"
+        ) from None
     if not hasattr(module, "URDF_PATH"):
         raise GraspAtlasError(f"'{name}' of robot_descriptions has no URDF")
     package = Path(module.PACKAGE_PATH)
     return str(module.URDF_PATH), tuple(map(str, dict.fromkeys((package.parent, package, module.REPOSITORY_PATH))))
+
+
+def _last_words(error: Exception) -> str:
+    """What git said in the end, such as that it knows no such host; or else the beginning of the error."""
+    words = " ".join(str(error).split())
+    _, found, last = words.rpartition("fatal: ")
+    return last.strip("'\" ")[-REASON:] if found else words[:REASON]

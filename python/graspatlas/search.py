@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.guessed_starts import starts_near
 from graspatlas.problem import Problem
@@ -30,6 +31,10 @@ Array = NDArray[np.float64]
 MAX_TRIES = 20_000
 #: Two grasps are one when their embeddings are nearer than this [units of the tangent space].
 SAME = 1e-6
+#: Grasps in a row from which no atlas can grow; then the equations are redundant everywhere, and the atlas says so.
+MAX_SPECIAL = 50
+#: A chart of this radius is laid at a grasp to see whether an atlas can grow there.
+TRIAL_RADIUS, TRIAL_EPSILON = 1e-2, 0.5
 
 
 def find_grasps(
@@ -101,7 +106,7 @@ def with_first_grasp(
         return problem
     search = GraspSearch(problem, dimension, seed=0)
     with search_bar("tries at a first grasp", progress) as bar:
-        x = search.next_grasp(deadline_after(max_seconds), bar)
+        x = search.next_start(deadline_after(max_seconds), bar)
     if x is None:
         raise search.failure()
     return search.problem.at(x)
@@ -171,6 +176,24 @@ class GraspSearch:
             if x is not None:
                 return x
         return None
+
+    def next_start(self, deadline: float, bar: tqdm[None]) -> Array | None:
+        """The next grasp from which an atlas can grow; or a special one, when ``MAX_SPECIAL`` in a row are special."""
+        first = None
+        for _ in range(MAX_SPECIAL):
+            x = self.next_grasp(deadline, bar)
+            if x is None or self.is_regular(x):
+                return first if x is None else x
+            first = x if first is None else first
+        return first
+
+    def is_regular(self, x: Array) -> bool:
+        """False for a special grasp, at which the equations lose rank, or so nearly that it slips across a bound."""
+        try:
+            _core.AtlasBuilder(self.system, x, TRIAL_RADIUS, TRIAL_EPSILON, 1)
+        except GraspAtlasError:
+            return False
+        return True
 
     def attempt(self) -> Array | None:
         """One try: a feasible grasp [size of x], or None."""

@@ -122,7 +122,9 @@ def _hand(urdf: str, folder: Path | None) -> tuple[Hand, str]:
         path, folders = described_robot(name)
         return Hand.from_urdf(path, name=name, package_paths=folders), f"robot_descriptions: {name}"
     if not Path(urdf).is_file():
-        raise GraspAtlasError(f"file '{urdf}' does not exist; give a URDF, or example_robot_data:NAME")
+        raise GraspAtlasError(
+            f"file '{urdf}' does not exist; give a URDF, example_robot_data:NAME or robot_descriptions:NAME"
+        )
     return Hand.from_urdf(Path(urdf).resolve()), f"urdf: {_relative(urdf, folder)}"
 
 
