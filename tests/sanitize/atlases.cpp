@@ -38,6 +38,7 @@ class Bowl : public graspatlas::Sphere {
     if (x[0] > hole_) R[0] = std::numeric_limits<double>::quiet_NaN();
   }
   void slack(const double* x, double* out) const override { out[0] = height_ - x[tangent_size() - 1]; }
+  std::unique_ptr<System> clone() const override { return std::make_unique<Bowl>(*this); }
 
  private:
   double height_, hole_;

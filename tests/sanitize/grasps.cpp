@@ -95,7 +95,8 @@ Tripod tripod(int kept, double length_scale) {
   motions = Eigen::HouseholderQR<Matrix>(motions).householderQ() * Matrix::Identity(9, kept);
   if (kept == 9) motions.setIdentity();
   const auto lower = model->lower_limits(), upper = model->upper_limits();
-  return {std::make_shared<GraspSystem>(model, contacts, motions, length_scale, lower, upper), x1};
+  return {std::make_shared<GraspSystem>(model, contacts, motions, length_scale, lower, upper, Matrix::Identity(9, 9)),
+          x1};
 }
 
 // Central differences of the residual against the Jacobian.
@@ -130,7 +131,7 @@ void trace(int kept, double radius, std::int64_t limit) {
   atlas.expand(limit, 5.0);
   require(atlas.count() > 10, "the atlas of a made-up grasp grows");
   Manipulability manipulability(system, 1e-3);
-  ForceClosure closure(system, 0.5);
+  ForceClosure closure(system, 0.5, 0.0), soft(system, 0.5, 0.005);
   std::vector<double> axes(system.object_dof()), R(system.equation_count());
   for (std::int64_t i = 0; i < atlas.count(); ++i) {
     system.residual(atlas.center(i), R.data());
@@ -139,6 +140,7 @@ void trace(int kept, double radius, std::int64_t limit) {
     for (double axis : axes) require(std::isfinite(axis) && axis >= 0.0, "semi-axes are numbers");
     const double margin = closure.margin(atlas.center(i));
     require(std::isfinite(margin) && margin >= 0.0, "margins are numbers");
+    require(soft.margin(atlas.center(i)) >= margin - 1e-9, "soft fingers hold no worse");
   }
 }
 
@@ -175,18 +177,20 @@ void wrong_systems() {
   auto model = std::make_shared<Model>(hand_urdf("revolute"), ObjectJoint::free_flyer);
   const auto lower = model->lower_limits(), upper = model->upper_limits();
   const Matrix all = Matrix::Identity(9, 9);
-  refuse([&] { GraspSystem(model, {}, Matrix::Identity(8, 8), 0.01, lower, upper); }, "rows");
-  refuse([&] { GraspSystem(model, {}, all, 0.0, lower, upper); }, "length_scale");
-  refuse([&] { GraspSystem(model, {}, all, 0.01, {0.0}, upper); }, "limits");
-  refuse([&] { GraspSystem(model, {}, all, 0.01, upper, lower); }, "limits");
+  refuse([&] { GraspSystem(model, {}, Matrix::Identity(8, 8), 0.01, lower, upper, all); }, "rows");
+  refuse([&] { GraspSystem(model, {}, all, 0.01, lower, upper, Matrix::Identity(8, 8)); }, "drives");
+  refuse([&] { GraspSystem(model, {}, all, 0.0, lower, upper, all); }, "length_scale");
+  refuse([&] { GraspSystem(model, {}, all, 0.01, {0.0}, upper, all); }, "limits");
+  refuse([&] { GraspSystem(model, {}, all, 0.01, upper, lower, all); }, "limits");
   const ContactSide nowhere = {99, {}, std::make_shared<PlanePatch>(Placement{}), {}, {}};
-  refuse([&] { GraspSystem(model, {{nowhere, nowhere}}, all, 0.01, lower, upper); }, "joint 99");
-  GraspSystem free(model, {}, all, 0.01, lower, upper);
+  refuse([&] { GraspSystem(model, {{nowhere, nowhere}}, all, 0.01, lower, upper, all); }, "joint 99");
+  GraspSystem free(model, {}, all, 0.01, lower, upper, all);
   refuse([&] { Manipulability(free, 1e-3); }, "contact");
-  refuse([&] { ForceClosure(free, 0.5); }, "contact");
+  refuse([&] { ForceClosure(free, 0.5, 0.0); }, "contact");
   const Tripod made = tripod(9, 0.01);
   refuse([&] { Manipulability(*made.system, 0.0); }, "length_unit");
-  refuse([&] { ForceClosure(*made.system, -1.0); }, "friction");
+  refuse([&] { ForceClosure(*made.system, -1.0, 0.0); }, "friction");
+  refuse([&] { ForceClosure(*made.system, 0.5, -1.0); }, "torsional");
 }
 
 // Grasps that no manifold has: qualities of arbitrary postures, contacts that miss, all fingers straight.
@@ -200,7 +204,9 @@ void arbitrary_grasps() {
     const double size = std::pow(10.0, random.uniform(-3.0, 3.0));
     for (int c = 0; c < 12; ++c) x[c] = i == 0 ? 0.0 : x[c] + size * random.normal();
     manipulability.semi_axes(x.data(), axes.data());
-    ForceClosure(*made.system, std::pow(10.0, random.uniform(-6.0, 6.0))).margin(x.data());
+    const double friction = std::pow(10.0, random.uniform(-6.0, 6.0));
+    for (const double torsional : {0.0, 0.01 * friction})
+      ForceClosure(*made.system, friction, torsional).margin(x.data());
   }
 }
 
