@@ -250,8 +250,8 @@ bool Atlas::next_generation(Worker& worker) {
 
 bool Atlas::tiny() const { return static_cast<int>(generation_.size()) < kTiny; }
 
-// The order in which the generation is expanded: it depends on its size only. New charts come in the order of a walk
-// along the front, so parts of it are mostly far apart: charts are taken from the beginning of each in turn.
+// The order in which the generation is expanded: it depends on its size only. Charts that follow each other in the
+// generation are mostly near each other, its parts are not: charts are taken from the beginning of each part in turn.
 void Atlas::choose_order(Worker& worker) {
   const int count = static_cast<int>(generation_.size()), size = system_.embedding_size();
   embeddings_.resize(generation_.size() * static_cast<std::size_t>(size));
