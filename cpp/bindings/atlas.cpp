@@ -3,6 +3,7 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <numeric>
 #include <string>
@@ -50,13 +51,16 @@ ArrayTable atlas_arrays(const Atlas& atlas) {
   const std::int64_t* const pair_start = starts.neighbours.data();
   auto centers = matrix<double>(n, x_size);
   auto bases = py::array_t<double>(std::vector<py::ssize_t>{n, k, v});
-  auto residuals = py::array_t<double>(n);
+  auto residuals = py::array_t<double>(n), regularities = py::array_t<double>(n);
+  auto nearly_singular = py::array_t<bool>(n);
   auto normals = matrix<double>(facet_start[n], k), vertices = matrix<double>(vertex_start[n], k);
   auto offsets = py::array_t<double>(facet_start[n]);
   auto tags = py::array_t<std::int32_t>(facet_start[n]);
   auto closed = py::array_t<std::uint8_t>(vertex_start[n]);
   auto pairs = matrix<std::int32_t>(pair_start[n], 2);
   double *center = centers.mutable_data(), *basis = bases.mutable_data(), *residual = residuals.mutable_data();
+  double* const regularity = regularities.mutable_data();
+  bool* const singular = nearly_singular.mutable_data();
   double *normal = normals.mutable_data(), *offset = offsets.mutable_data(), *vertex = vertices.mutable_data();
   std::int32_t *tag = tags.mutable_data(), *pair = pairs.mutable_data();
   std::uint8_t* state = closed.mutable_data();
@@ -66,6 +70,8 @@ ArrayTable atlas_arrays(const Atlas& atlas) {
     std::copy_n(atlas.center(i), x_size, center + i * x_size);
     std::copy_n(atlas.basis(i), k * v, basis + i * k * v);
     residual[i] = chart.residual;
+    regularity[i] = std::abs(chart.regularity);
+    singular[i] = chart.nearly_singular;
     std::int64_t f = facet_start[i];
     for (int a = 0; a < p.facet_slots(); ++a) {
       if (!p.facet_active(a)) continue;
@@ -90,6 +96,8 @@ ArrayTable atlas_arrays(const Atlas& atlas) {
   out["centers"] = centers;
   out["bases"] = bases;
   out["residuals"] = residuals;
+  out["regularities"] = regularities;
+  out["nearly_singular"] = nearly_singular;
   out["facet_start"] = starts.facets;
   out["facet_normals"] = normals;
   out["facet_offsets"] = offsets;
@@ -114,6 +122,7 @@ void visit_checkpoint(Table& table, const Visit& visit) {
   visit("centers", table.centers);
   visit("bases", table.bases);
   visit("residuals", table.residuals);
+  visit("regularities", table.regularities);
   visit("keys", table.keys);
   visit("closed_charts", table.closed_charts);
   visit("closed_vertices", table.closed_vertices);
@@ -131,6 +140,12 @@ Checkpoint read_checkpoint(const ArrayTable& table) {
   out.position = counts[0];
   out.next_first = counts[1];
   out.task_count = counts[2];
+  std::vector<std::int64_t> paused;
+  read_array(table, "paused", paused);
+  if (paused.size() % 3 != 0) throw Error("the checkpoint's paused tasks must be triples");
+  for (std::size_t i = 0; i < paused.size(); i += 3)
+    out.paused.push_back(
+        {paused[i], static_cast<std::int32_t>(paused[i + 1]), static_cast<std::int32_t>(paused[i + 2])});
   return out;
 }
 
@@ -142,6 +157,12 @@ ArrayTable write_checkpoint(const Checkpoint& checkpoint) {
   });
   const std::int64_t counts[] = {checkpoint.position, checkpoint.next_first, checkpoint.task_count};
   out["counts"] = py::array_t<std::int64_t>(3, counts);
+  auto paused = matrix<std::int64_t>(static_cast<py::ssize_t>(checkpoint.paused.size()), 3);
+  std::int64_t* numbers = paused.mutable_data();
+  for (const PausedTask& task : checkpoint.paused)
+    for (const std::int64_t number : {task.number, std::int64_t{task.turn}, std::int64_t{task.made}})
+      *numbers++ = number;
+  out["paused"] = paused;
   return out;
 }
 

@@ -89,6 +89,8 @@ class Atlas:
     centers: Array
     bases: Array
     residuals: Array
+    regularities: Array
+    nearly_singular: NDArray[np.bool_]
     facet_start: IntArray
     facet_normals: Array
     facet_offsets: Array
@@ -110,6 +112,8 @@ class Atlas:
             "centers": (n, self.system.configuration_size),
             "bases": (n, k, v),
             "residuals": (n,),
+            "regularities": (n,),
+            "nearly_singular": (n,),
             "facet_start": (n + 1,),
             "facet_normals": (facets, k),
             "facet_offsets": (facets,),
@@ -122,9 +126,10 @@ class Atlas:
         for name, shape in shapes.items():
             array = getattr(self, name)
             whole = name in ("facet_start", "facet_tags", "vertex_start", "vertex_closed", "neighbour_pairs")
-            if array.shape != shape or array.dtype.kind not in ("iu" if whole else "f"):
+            kinds = "b" if name == "nearly_singular" else "iu" if whole else "f"
+            if array.shape != shape or array.dtype.kind not in kinds:
                 raise GraspAtlasError(f"array '{name}' has shape {array.shape} and type {array.dtype}, not {shape}")
-            if not whole and not (np.abs(array) < LARGEST).all():
+            if kinds == "f" and not (np.abs(array) < LARGEST).all():
                 raise GraspAtlasError(f"array '{name}' holds a number that is not finite, or not below {LARGEST:g}")
         ends_fit = all(
             start[0] == 0 and start[-1] == end and (np.diff(start) > k).all()

@@ -19,9 +19,9 @@ from graspatlas.systems import AnySystem
 __all__ = ["CheckpointFolder", "run_digest"]
 
 #: Changes when a checkpoint of an older version would not lead to the same atlas.
-VERSION = 2
+VERSION = 3
 #: Arrays of which each file of a checkpoint holds the part that came after the file before it.
-_GROWING = ("centers", "bases", "residuals", "keys")
+_GROWING = ("centers", "bases", "residuals", "regularities", "keys")
 #: A step away from x0 at which the system is looked at, to tell it from others [units of the tangent space].
 _STEP = 1e-3
 

@@ -10,8 +10,6 @@ namespace graspatlas {
 
 namespace {
 
-// Charts that one task may make: a chart with more to make comes again in the next generation.
-constexpr int kMostCharts = 64;
 // How often a thread looks whether it may go on before it goes to sleep.
 constexpr int kLooks = 1000;
 // A generation of fewer charts is left to one thread: others would mostly wait for it.
@@ -65,7 +63,8 @@ Atlas::Atlas(System& system, const Checkpoint& saved, const AtlasOptions& option
 }
 
 std::int64_t Atlas::open_count() const {
-  return static_cast<std::int64_t>(turns_.size() - position_ + order_.size() - next_first_ + again_.size());
+  return static_cast<std::int64_t>(turns_.size() - position_ + paused_.size() + order_.size() - next_first_ +
+                                   again_.size());
 }
 
 std::int64_t Atlas::projections() const {
@@ -110,14 +109,16 @@ void Atlas::expand(std::int64_t chart_limit, double seconds) {
 void Atlas::work(Worker& worker) {
   try {
     while (Task* const task = take_task(worker)) {
-      int made = task->most;  // should it fail: as if more were to be made
+      int made = task->made;
       try {
-        made = worker.expander->expand(task->slot, static_cast<ChartKey>(task->number) * kMostCharts, task->most);
+        const auto key = static_cast<ChartKey>(task->number) * kMostCharts;
+        const int slot = generation_[static_cast<std::size_t>(task->turn)];
+        const bool done = worker.expander->expand(slot, key, task->most, made, deadline_);
+        finish_task(worker, *task, made, done);
       } catch (...) {
-        finish_task(worker, *task, made);
+        finish_task(worker, *task, made, false);
         throw;
       }
-      finish_task(worker, *task, made);
     }
   } catch (...) {
     stop_after_error();
@@ -151,7 +152,7 @@ Atlas::Task* Atlas::take_task(Worker& worker) {
       wait(lock);
     } else if (stop_) {
       return nullptr;
-    } else if ((position_ == turns_.size() && !next_generation(worker)) || made_ >= chart_limit_) {
+    } else if ((!has_next() && !next_generation(worker)) || made_ >= chart_limit_) {
       stop();
     } else if (!may_admit()) {
       // Towards the limit of charts, tasks come one by one and with what is left, so that it is met exactly.
@@ -161,7 +162,7 @@ Atlas::Task* Atlas::take_task(Worker& worker) {
 }
 
 bool Atlas::may_admit() const {
-  return !stop_ && admitted_ < kWindow && position_ < turns_.size() && chart_limit_ - made_ - promised_ >= kMostCharts;
+  return !stop_ && admitted_ < kWindow && has_next() && chart_limit_ - made_ - promised_ >= kMostCharts;
 }
 
 // The first in the window that nobody is at, and that nothing must be waited for.
@@ -172,39 +173,58 @@ Atlas::Task* Atlas::first_free_task() {
   return first;
 }
 
-// Puts the next chart of the generation into the window, where there must be room.
-void Atlas::admit_task(std::int64_t most) {
+// Where the chart of a turn of the generation lies.
+const double* Atlas::embedding(int turn) const {
+  return &embeddings_[static_cast<std::size_t>(turn) * static_cast<std::size_t>(system_.embedding_size())];
+}
+
+// Puts the next chart of the generation into the window, where there must be room; it may make `more` charts at most.
+void Atlas::admit_task(std::int64_t more) {
   const int size = system_.embedding_size();
   const double distance = kIndependent * options_.radius;
-  const auto turn = static_cast<std::size_t>(turns_[position_++]);
+  PausedTask next{};
+  if (!paused_.empty()) {
+    next = paused_.front();
+    paused_.erase(paused_.begin());
+  } else {
+    next = {++task_count_, turns_[position_++], 0};
+  }
   Task* place = nullptr;
   std::uint32_t before = 0;
   for (int i = 0; i < kWindow; ++i) {
     if (window_[i].number == 0)
       place = &window_[i];
-    else if (is_within(&embeddings_[turn * size], window_[i].embedding, size, distance * distance))
+    else if (is_within(embedding(next.turn), embedding(window_[i].turn), size, distance * distance))
       before |= std::uint32_t{1} << i;
   }
-  *place = {++task_count_, generation_[turn], static_cast<int>(most), &embeddings_[turn * size], before, false};
+  const int most = static_cast<int>(std::min<std::int64_t>(kMostCharts, next.made + more));
+  *place = {next.number, next.turn, next.made, most, before, false};
   ++admitted_;
-  promised_ += most;
-  if (Clock::now() > deadline_) stop();  // but what is in the window is done
+  promised_ += most - next.made;
+  if (Clock::now() > deadline_) stop();  // what is in the window and not begun is put back
 }
 
-void Atlas::finish_task(Worker& worker, Task& task, int made) {
+// Takes a task out of the window. One that is not done goes on in its place, or in the next generation when it has made
+// as many charts as a task may.
+void Atlas::finish_task(Worker& worker, Task& task, int made, bool done) {
   const std::lock_guard lock(mutex_);
-  made_ += made;
-  promised_ -= task.most;
-  if (made >= task.most) {
-    if (task.most < kMostCharts)
-      --position_;  // it was the last: it goes on where it stopped
-    else
-      again_.push_back(task.slot);
-  }
+  made_ += made - task.made;
+  promised_ -= task.most - task.made;
+  if (!done && made >= kMostCharts)
+    again_.push_back(generation_[static_cast<std::size_t>(task.turn)]);
+  else if (!done)
+    pause(task, made);
   std::vector<int>& reopened = worker.expander->reopened();
   again_.insert(again_.end(), reopened.begin(), reopened.end());
   reopened.clear();
   free_place(task);
+}
+
+// A task that goes on in a later call, before all that come after it.
+void Atlas::pause(const Task& task, int made) {
+  const PausedTask paused{task.number, task.turn, made};
+  const auto after = [](const PausedTask& a, const PausedTask& b) { return a.number < b.number; };
+  paused_.insert(std::upper_bound(paused_.begin(), paused_.end(), paused, after), paused);
 }
 
 void Atlas::free_place(Task& task) {
@@ -216,21 +236,22 @@ void Atlas::free_place(Task& task) {
   changed_.notify_all();
 }
 
+// No more are admitted; what was admitted and not begun is kept for later.
 void Atlas::stop() {
+  for (Task& task : window_) {
+    if (task.number == 0 || task.running) continue;
+    promised_ -= task.most - task.made;
+    pause(task, task.made);
+    free_place(task);
+  }
   stop_ = true;
   ++events_;
   changed_.notify_all();
   helpers_wanted_.notify_all();
 }
 
-// What was admitted and not begun is kept for later.
 void Atlas::stop_after_error() {
   const std::lock_guard lock(mutex_);
-  for (Task& task : window_) {
-    if (task.number == 0 || task.running) continue;
-    again_.push_back(task.slot);
-    free_place(task);
-  }
   stop();
 }
 

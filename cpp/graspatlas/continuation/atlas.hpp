@@ -30,6 +30,9 @@ namespace graspatlas {
 /// bit.
 class Atlas {
  public:
+  /// Charts that one task may make: a chart with more to make comes again in the next generation.
+  static constexpr int kMostCharts = 64;
+
   /// Starts with one chart at the point of the manifold nearest x0.
   /// Throws when x0 cannot be projected, breaks a bound, or the Jacobian there is rank deficient.
   /// A system that cannot be cloned is left to one thread.
@@ -65,7 +68,6 @@ class Atlas {
   const System& system() const { return system_; }
 
  private:
-  using Clock = std::chrono::steady_clock;
   static constexpr int kWindow = 32;
 
   struct Worker {
@@ -74,10 +76,10 @@ class Atlas {
   };
   /// A chart to expand.
   struct Task {
-    std::int64_t number;      // in the order of the algorithm; 0: this place in the window is free
-    int slot, most;           // the chart, and how many it may make
-    const double* embedding;  // of the chart
-    std::uint32_t before;     // places in the window of those that must be done first
+    std::int64_t number;   // in the order of the algorithm; 0: this place in the window is free
+    int turn;              // the chart's place in the generation
+    int made, most;        // charts that it has made, and how many it may make in all
+    std::uint32_t before;  // places in the window of those that must be done first
     bool running;
   };
   using Lock = std::unique_lock<std::mutex>;
@@ -89,8 +91,11 @@ class Atlas {
   Task* take_task(Worker& worker);
   Task* first_free_task();
   void admit_task(std::int64_t most);
+  bool has_next() const { return !paused_.empty() || position_ < turns_.size(); }
   bool may_admit() const;
-  void finish_task(Worker& worker, Task& task, int made);
+  const double* embedding(int turn) const;
+  void finish_task(Worker& worker, Task& task, int made, bool done);
+  void pause(const Task& task, int made);
   void free_place(Task& task);
   void stop_after_error();
   void stop();
@@ -111,6 +116,7 @@ class Atlas {
   std::size_t position_ = 0;             // in turns_
   std::size_t next_first_ = 0;           // in order_: where the next generation begins
   std::vector<int> again_;               // charts that made as many as one task may, or were opened again
+  std::vector<PausedTask> paused_;       // tasks that time or the limit of charts cut short; they go on first
   std::int64_t task_count_ = 0;
 
   // State of one call of expand, guarded by mutex_.

@@ -34,6 +34,10 @@ struct Chart {
   int number = -1;        ///< in the order of the algorithm; -1 until that is settled
   ChartKey key = 0;       ///< ascends in the order of the algorithm
   double residual = 0.0;  ///< largest entry of |R| at the centre
+  /// Newton::regularity at the centre: its size tells how near the Jacobian is to losing rank, and where its sign is
+  /// another than a neighbour's, beside the orientations of their bases, it has lost it between the two.
+  double regularity = 1.0;
+  bool nearly_singular = false;  ///< to first order the Jacobian loses rank within the chart
 };
 
 /// The charts of an atlas as several threads make them: each has a slot, a number that means nothing.

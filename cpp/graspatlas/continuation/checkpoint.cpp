@@ -17,12 +17,17 @@ void check_sizes(const Checkpoint& saved, const System& system) {
   };
   const bool sound = n > 0 && saved.centers.size() == n * static_cast<std::size_t>(system.configuration_size()) &&
                      saved.bases.size() == n * k * static_cast<std::size_t>(system.tangent_size()) &&
-                     saved.residuals.size() == n && std::is_sorted(saved.keys.begin(), saved.keys.end()) &&
+                     saved.residuals.size() == n && saved.regularities.size() == n && std::is_sorted(saved.keys.begin(), saved.keys.end()) &&
                      saved.closed_vertices.size() == m * k && saved.closed_reasons.size() == m &&
                      all_in_range(saved.closed_charts) && all_in_range(saved.generation) && all_in_range(saved.again) &&
                      saved.position >= 0 && saved.position <= static_cast<std::int64_t>(saved.generation.size()) &&
                      saved.next_first >= 0 && saved.next_first <= static_cast<std::int64_t>(n) && saved.task_count >= 0;
-  if (!sound) throw Error("the checkpoint is damaged, or of another system");
+  const bool paused_in_range =
+      std::all_of(saved.paused.begin(), saved.paused.end(), [&saved](const PausedTask& task) {
+        return task.number > 0 && task.number <= saved.task_count && task.turn >= 0 && task.made >= 0 &&
+               static_cast<std::size_t>(task.turn) < saved.generation.size() && task.made < Atlas::kMostCharts;
+      });
+  if (!sound || !paused_in_range) throw Error("the checkpoint is damaged, or of another system");
 }
 
 }  // namespace
@@ -34,6 +39,7 @@ Checkpoint Atlas::save(std::int64_t first) const {
     out.centers.insert(out.centers.end(), center(i), center(i) + x_size);
     out.bases.insert(out.bases.end(), basis(i), basis(i) + basis_size);
     out.residuals.push_back(chart(i).residual);
+    out.regularities.push_back(chart(i).regularity);
     out.keys.push_back(chart(i).key);
   }
   for (std::int64_t i = 0; i < count(); ++i) {
@@ -48,6 +54,7 @@ Checkpoint Atlas::save(std::int64_t first) const {
   }
   for (const int slot : generation_) out.generation.push_back(number(slot));
   for (const int slot : again_) out.again.push_back(number(slot));
+  out.paused = paused_;
   out.position = static_cast<std::int64_t>(position_);
   out.next_first = static_cast<std::int64_t>(next_first_);
   out.task_count = task_count_;
@@ -60,7 +67,7 @@ void Atlas::restore(const Checkpoint& saved) {
   Worker& worker = *workers_.front();
   for (std::size_t i = 0; i < saved.keys.size(); ++i) {
     worker.expander->put_back(&saved.centers[i * x_size], &saved.bases[i * basis_size], saved.residuals[i],
-                              saved.keys[i]);
+                              saved.regularities[i], saved.keys[i]);
     charts_[static_cast<int>(i)].done = true;
   }
   // A slot is a chart's number now.
@@ -80,6 +87,8 @@ void Atlas::restore(const Checkpoint& saved) {
   position_ = static_cast<std::size_t>(saved.position);
   next_first_ = static_cast<std::size_t>(saved.next_first);
   task_count_ = saved.task_count;
+  paused_ = saved.paused;
+  for (const PausedTask& task : paused_) charts_[generation_[static_cast<std::size_t>(task.turn)]].done = false;
   for (std::size_t turn = position_; turn < turns_.size(); ++turn) charts_[generation_[turns_[turn]]].done = false;
   for (std::size_t i = next_first_; i < order_.size(); ++i) charts_[order_[i]].done = false;
   for (const int slot : again_) charts_[slot].done = false;

@@ -7,13 +7,20 @@
 
 namespace graspatlas {
 
+/// The expansion of a chart that was begun and not ended.
+struct PausedTask {
+  std::int64_t number;  ///< in the order of the algorithm
+  std::int32_t turn;    ///< the chart's place in the generation
+  std::int32_t made;    ///< charts that it has made
+};
+
 /// What an atlas in the making must keep to be made anew, to the bit, without projecting its charts again.
 ///
 /// Polytopes are not kept: charts that are put back in their order cut each other as they did. Charts are named by
 /// their numbers.
 struct Checkpoint {
   /// Charts, from one on: centres [n x configuration_size], tangent bases [n x dimension x tangent_size].
-  std::vector<double> centers, bases, residuals;
+  std::vector<double> centers, bases, residuals, regularities;
   std::vector<ChartKey> keys;
 
   /// Vertices that were closed: chart, position [m x dimension], and reason.
@@ -23,6 +30,7 @@ struct Checkpoint {
 
   /// The generation that is being expanded, how much of it is done, and charts that come again in the next one.
   std::vector<std::int32_t> generation, again;
+  std::vector<PausedTask> paused;
   std::int64_t position = 0, next_first = 0, task_count = 0;
 };
 

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <string>
 
-#include "graspatlas/continuation/chart.hpp"
-
 namespace graspatlas {
 
 namespace {
@@ -19,12 +17,6 @@ constexpr std::size_t kListBlock = 1 << 16;
 // the ball so that it has ends outside.
 double half_width(int dimension, double radius) { return dimension == 1 ? 1.5 * radius : radius; }
 
-double squared_length(const double* v, int size) {
-  double sum = 0.0;
-  for (int c = 0; c < size; ++c) sum += v[c] * v[c];
-  return sum;
-}
-
 }  // namespace
 
 Expander::Expander(System& system, const AtlasOptions& options, Charts& charts)
@@ -35,13 +27,12 @@ Expander::Expander(System& system, const AtlasOptions& options, Charts& charts)
       n_(system.tangent_size()),
       k_(system.dimension()),
       newton_(system, options.newton),
+      test_(system, newton_, options.radius, options.epsilon),
       x_new_(x_size_),
       Phi_new_(static_cast<std::size_t>(k_) * n_),
       step_(n_),
-      displacement_(n_),
       p_ij_(k_),
       p_ji_(k_),
-      work_(2 * static_cast<std::size_t>(k_) * k_),
       slack_(system.bound_count()),
       bound_in_chart_(k_),
       direction_(k_),
@@ -64,18 +55,23 @@ void Expander::start(const double* x0) {
       throw Error("x0 is not on the manifold and could not be projected onto it: residual " +
                   to_text(newton_.residual()));
   }
+  newton_.project(x_new_.data(), Phi_new_.data());  // for its factorisation
+  residual_new_ = newton_.residual();
+  regularity_new_ = newton_.regularity();
   if (!inside_bounds(x_new_.data())) {
     const auto worst = std::min_element(slack_.begin(), slack_.end()) - slack_.begin();
     throw Error("x0, projected onto the manifold, breaks the " + system_.bound_name(static_cast<int>(worst)) + " by " +
                 to_text(-slack_[worst]));
   }
-  add_chart(0, newton_.residual());
+  add_chart(0);
 }
 
-void Expander::put_back(const double* center, const double* basis, double residual, ChartKey key) {
+void Expander::put_back(const double* center, const double* basis, double residual, double regularity, ChartKey key) {
   x_new_.assign(center, center + x_size_);
   Phi_new_.assign(basis, basis + static_cast<std::ptrdiff_t>(k_) * n_);
-  add_chart(key, residual);
+  residual_new_ = residual;
+  regularity_new_ = regularity;
+  add_chart(key);
 }
 
 bool Expander::inside_bounds(const double* x) {
@@ -91,17 +87,17 @@ const double* Expander::embedding_of(int slot) {
   return embedding_.data();
 }
 
-int Expander::expand(int i, ChartKey key, int most) {
-  int made = 0;
+bool Expander::expand(int i, ChartKey key, int most, int& made, Clock::time_point deadline) {
   while (made < most) {
     const int vertex = charts_[i].polytope.expandable_vertex(options_.radius);
     if (vertex < 0) {
       charts_[i].done = true;
-      break;
+      return true;
     }
     if (expand_vertex(i, vertex, key + static_cast<ChartKey>(made))) ++made;
+    if (Clock::now() > deadline) break;
   }
-  return made;
+  return false;
 }
 
 bool Expander::expand_vertex(int i, int vertex, ChartKey key) {
@@ -114,7 +110,7 @@ bool Expander::expand_vertex(int i, int vertex, ChartKey key) {
   for (double alpha = options_.radius; alpha >= options_.smallest_step * options_.radius; alpha *= options_.shrink) {
     reason = attempt(i, direction_.data(), alpha);
     if (reason == Closed::open) {
-      add_chart(key, newton_.residual());
+      add_chart(key);
       // The new neighbour cuts the vertex off; should rounding keep it, it must not be expanded again.
       for (int u = 0; u < polytope.vertex_count(); ++u)
         if (std::equal(vertex_.begin(), vertex_.end(), polytope.vertex(u))) close(i, u, Closed::curvature);
@@ -133,45 +129,47 @@ void Expander::close(int i, int vertex, Closed reason) {
 // Projects a step of length alpha from chart i into x_new_, Phi_new_: eqs (14) to (18).
 Closed Expander::attempt(int i, const double* direction, double alpha) {
   const double* Phi = charts_.basis(i);
-  for (int c = 0; c < n_; ++c) {
-    double sum = 0.0;
-    for (int a = 0; a < k_; ++a) sum += Phi[static_cast<std::size_t>(a) * n_ + c] * direction[a];
-    step_[c] = alpha * sum;
-  }
+  tangent_vector(Phi, direction, k_, n_, step_.data());
+  for (double& s : step_) s *= alpha;
   system_.integrate(charts_.center(i), step_.data(), x_new_.data());
   ++projections_;
   if (newton_.project(x_new_.data(), Phi) != Projection::converged) return Closed::not_converged;
   if (!inside_bounds(x_new_.data())) return Closed::bounds;
   if (!newton_.tangent_basis(Phi_new_.data())) return Closed::not_converged;
-  if (!pass_tests(i, x_new_.data(), Phi_new_.data(), p_ij_.data(), p_ji_.data())) return Closed::curvature;
+  residual_new_ = newton_.residual();
+  regularity_new_ = newton_.regularity();
+  if (!meets(i)) return Closed::curvature;
   const double longest = kLongestStep * options_.radius;
-  if (squared_length(displacement_.data(), n_) > longest * longest) return Closed::curvature;
+  if (squared_length(test_.displacement(), n_) > longest * longest) return Closed::curvature;
   return Closed::open;
 }
 
-// Eqs (17) and (18) between chart i and a chart at x_j, and the images of each centre in the other's tangent space.
-// Eq (17) is a length, which may exceed a chart's own size: then charts on two sides of a fold would cut each other at
-// images far from the middle between them, and leave a gap. So the displacement between the centres, too, may differ
-// from either tangent space by no larger an angle than eq (18) allows between the spaces.
-bool Expander::pass_tests(int i, const double* x_j, const double* Phi_j, double* p_ij, double* p_ji) {
-  system_.difference(charts_.center(i), x_j, displacement_.data());
-  const double squared = squared_length(displacement_.data(), n_);
-  if (squared > 4.0 * options_.radius * options_.radius) return false;
-  const double cosine = 1.0 - options_.epsilon;
-  const double limit = std::min(options_.epsilon * options_.epsilon, (1.0 - cosine * cosine) * squared);
-  if (project_displacement(charts_.basis(i), displacement_.data(), k_, n_, p_ij) > limit) return false;
-  if (project_displacement(Phi_j, displacement_.data(), k_, n_, p_ji) > limit) return false;
-  for (int a = 0; a < k_; ++a) p_ji[a] = -p_ji[a];
-  return tangent_spaces_agree(charts_.basis(i), Phi_j, k_, n_, cosine, work_.data());
+// Whether the candidate passes the tests with chart i; the images of each centre in the other's tangent space.
+bool Expander::meets(int i) {
+  return test_.passes(charts_.center(i), charts_.basis(i), x_new_.data(), Phi_new_.data(), p_ij_.data(), p_ji_.data());
+}
+
+// Marks charts within which the Jacobian loses rank, to first order: its regularity has another sign beside, or falls
+// to zero within a radius at the rate at which it falls from one centre to the other.
+void Expander::compare_regularity(int i, int j, double distance) {
+  Chart &one = charts_[i], &other = charts_[j];
+  const double a = std::abs(one.regularity), b = std::abs(other.regularity);
+  const bool turned = determinant_negative(test_.bases_product(), k_);
+  if (((one.regularity < 0.0) != (other.regularity < 0.0)) != turned) {
+    one.nearly_singular = other.nearly_singular = true;
+  } else if (std::min(a, b) * distance < std::abs(a - b) * options_.radius) {
+    (a < b ? one : other).nearly_singular = true;
+  }
 }
 
 // The chart at x_new_: its own polytope first, which is stored when it has its size, then it is shown to others.
-void Expander::add_chart(ChartKey key, double residual) {
+void Expander::add_chart(ChartKey key) {
   const int j = charts_.add();
   Chart& chart = charts_[j];
   std::copy(x_new_.begin(), x_new_.end(), charts_.center(j));
   std::copy(Phi_new_.begin(), Phi_new_.end(), charts_.basis(j));
-  chart.residual = residual;
+  chart.residual = residual_new_;
+  chart.regularity = regularity_new_;
   chart.key = key;
   polytope_.reset(k_, half_width(k_, options_.radius));
   cut_by_bounds(j);
@@ -222,9 +220,10 @@ void Expander::meet_neighbours(int j) {
   find_near();
   neighbours_.clear();
   for (const int i : near_) {
-    if (!pass_tests(i, x_new_.data(), Phi_new_.data(), p_ij_.data(), p_ji_.data())) continue;
+    if (!meets(i)) continue;
     const double squared_ij = squared_length(p_ij_.data(), k_), squared_ji = squared_length(p_ji_.data(), k_);
     if (!(squared_ij > 0.0) || !(squared_ji > 0.0)) continue;
+    compare_regularity(i, j, std::sqrt(squared_length(test_.displacement(), n_)));
     const double norm_ij = std::sqrt(squared_ij), norm_ji = std::sqrt(squared_ji);
     for (int a = 0; a < k_; ++a) {
       p_ij_[a] /= norm_ij;

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "graspatlas/continuation/charts.hpp"
+#include "graspatlas/continuation/neighbour_test.hpp"
 #include "graspatlas/continuation/newton.hpp"
 #include "graspatlas/continuation/polytope.hpp"
 #include "graspatlas/continuation/system.hpp"
@@ -21,6 +23,8 @@ constexpr double kLongestStep = 1.5;
 /// The last term is for rounding.
 constexpr double kIndependent = 2.0 * (kLongestStep + 2.0) + 1e-3;
 
+using Clock = std::chrono::steady_clock;
+
 /// Expands charts: lines 6 to 12 of Algorithm 1, with the work space of one thread.
 class Expander {
  public:
@@ -31,20 +35,20 @@ class Expander {
   /// Throws when x0 cannot be projected, breaks a bound, or the Jacobian there is rank deficient.
   void start(const double* x0);
 
-  /// Expand a chart until no vertex is left, or `most` charts were made, which get the keys from `key` on. Returns
-  /// their number.
-  int expand(int slot, ChartKey key, int most);
+  /// Expand a chart until no vertex is left: then true. False when it has made `most` charts, which get the keys from
+  /// `key` on, or the deadline has passed. `made` is how many it has made, before this call too.
+  bool expand(int slot, ChartKey key, int most, int& made, Clock::time_point deadline);
   /// Charts that were done and have got a vertex to expand by that: a cut may make one beside a closed vertex. For the
   /// caller to take.
   std::vector<int>& reopened() { return reopened_; }
 
   /// Adds a chart of an atlas that was saved; all that have smaller keys must be there.
-  void put_back(const double* center, const double* basis, double residual, ChartKey key);
+  void put_back(const double* center, const double* basis, double residual, double regularity, ChartKey key);
 
   const double* embedding_of(int slot);
 
   /// Newton projections made so far, those of failed attempts included.
-  std::int64_t projections() const { return projections_; }
+  std::int64_t projections() const { return projections_ + test_.projections(); }
   /// Memory by which this expander made polytopes grow, and that of the lists of neighbours that it made.
   std::int64_t polytope_bytes() const { return polytope_bytes_; }
   std::int64_t list_bytes() const { return list_bytes_; }
@@ -52,12 +56,13 @@ class Expander {
  private:
   Closed attempt(int i, const double* direction, double alpha);
   bool expand_vertex(int i, int vertex, ChartKey key);
-  void add_chart(ChartKey key, double residual);
+  void add_chart(ChartKey key);
   void close(int i, int vertex, Closed reason);
   void cut_by_bounds(int j);
   void meet_neighbours(int j);
   void find_near();
-  bool pass_tests(int i, const double* x_j, const double* Phi_j, double* p_ij, double* p_ji);
+  bool meets(int i);
+  void compare_regularity(int i, int j, double distance);
   bool inside_bounds(const double* x);
   const int* keep(const std::vector<int>& list);
 
@@ -66,14 +71,16 @@ class Expander {
   Charts& charts_;
   int x_size_, n_, k_;
   Newton newton_;
+  NeighbourTest test_;
   std::int64_t projections_ = 0, polytope_bytes_ = 0, list_bytes_ = 0;
   std::vector<std::unique_ptr<int[]>> lists_;  // of neighbours, one after another
   int* next_list_ = nullptr;                   // where the next goes
   std::size_t list_room_ = 0;                  // left there
 
   // Scratch: the candidate chart and its polytope, and work space of the tests.
-  std::vector<double> x_new_, Phi_new_, step_, displacement_, p_ij_, p_ji_, work_, slack_, bound_in_chart_, direction_,
-      vertex_, embedding_;
+  double residual_new_ = 0.0, regularity_new_ = 1.0;
+  std::vector<double> x_new_, Phi_new_, step_, p_ij_, p_ji_, slack_, bound_in_chart_, direction_, vertex_,
+      embedding_;
   Polytope polytope_;
   Polytope::Scratch cut_scratch_;
   Neighbours::Scratch near_scratch_;

@@ -15,6 +15,7 @@ LinearSolver::LinearSolver(int size)
       storage_(static_cast<std::size_t>(size) * stride_),
       rows_(size),
       origin_(size),
+      inverse_pivots_(size),
       permuted_(size) {}
 
 bool LinearSolver::factorize() {
@@ -25,6 +26,7 @@ bool LinearSolver::factorize() {
     origin_[i] = i;
     for (int j = 0; j < n; ++j) largest = std::max(largest, std::abs(rows_[i][j]));
   }
+  determinant_negative_ = false;
   const double threshold = kSingular * largest;
   for (int c = 0; c < n; ++c) {
     int pivot = c;
@@ -33,8 +35,10 @@ bool LinearSolver::factorize() {
     if (!(std::abs(rows_[pivot][c]) > threshold)) return false;
     std::swap(rows_[c], rows_[pivot]);
     std::swap(origin_[c], origin_[pivot]);
+    determinant_negative_ ^= (pivot != c) != (rows_[c][c] < 0.0);
     const double* __restrict top = rows_[c];
     const double inverse = 1.0 / top[c];
+    inverse_pivots_[c] = inverse;
     for (int i = c + 1; i < n; ++i) {
       double* __restrict below = rows_[i];
       if (below[c] == 0.0) continue;
@@ -69,7 +73,25 @@ void LinearSolver::solve(double* b) const {
   permuted_.resize(n);
   double* y = permuted_.data();
   for (int i = 0; i < n; ++i) y[i] = b[origin_[i]] - dot(rows_[i], y, i);
-  for (int i = n - 1; i >= 0; --i) b[i] = (y[i] - dot(rows_[i] + i + 1, b + i + 1, n - i - 1)) / rows_[i][i];
+  for (int i = n - 1; i >= 0; --i) b[i] = (y[i] - dot(rows_[i] + i + 1, b + i + 1, n - i - 1)) * inverse_pivots_[i];
+}
+
+// A = P' L U: first U' z = b, then L' y = z; row by row, since rows are contiguous.
+void LinearSolver::solve_transposed(double* b) const {
+  const int n = size_;
+  permuted_.resize(n);
+  double* y = permuted_.data();
+  std::copy_n(b, n, y);
+  for (int i = 0; i < n; ++i) {
+    const double* __restrict row = rows_[i];
+    y[i] *= inverse_pivots_[i];
+    for (int j = i + 1; j < n; ++j) y[j] -= y[i] * row[j];
+  }
+  for (int i = n - 1; i > 0; --i) {
+    const double* __restrict row = rows_[i];
+    for (int j = 0; j < i; ++j) y[j] -= y[i] * row[j];
+  }
+  for (int i = 0; i < n; ++i) b[origin_[i]] = y[i];
 }
 
 void LinearSolver::solve(double* B, int columns) const {
@@ -94,8 +116,7 @@ void LinearSolver::solve(double* B, int columns) const {
       const double* __restrict below = B + static_cast<std::ptrdiff_t>(j) * columns;
       for (int c = 0; c < columns; ++c) b[c] -= factor * below[c];
     }
-    const double inverse = 1.0 / rows_[i][i];
-    for (int c = 0; c < columns; ++c) b[c] *= inverse;
+    for (int c = 0; c < columns; ++c) b[c] *= inverse_pivots_[i];
   }
 }
 

@@ -21,14 +21,22 @@ class LinearSolver {
   /// Solve A y = b in place with the last factorisation.
   void solve(double* b) const;
 
+  /// Solve A' y = b in place.
+  void solve_transposed(double* b) const;
+
+  /// True when the determinant of the last matrix is negative.
+  bool determinant_negative() const { return determinant_negative_; }
+
   /// Solve A Y = B in place for `columns` right-hand sides; B is row-major [size x columns].
   void solve(double* B, int columns) const;
 
  private:
   int size_, stride_;
+  bool determinant_negative_ = false;
   std::vector<double> storage_;
   std::vector<double*> rows_;  // rows in pivoted order
   std::vector<int> origin_;    // origin_[i]: index of the original row that stands at i
+  std::vector<double> inverse_pivots_;
   mutable std::vector<double> permuted_;
 };
 

@@ -8,21 +8,28 @@ namespace graspatlas {
 
 namespace {
 
-// Below this residual the factorisation serves for the remaining steps, which converge at once, and for the
-// tangent basis.
+// As near the manifold as this the factorisation serves for the remaining steps, which converge at once, and for the
+// tangent basis [units of the tangent space].
 constexpr double kNearlyZero = 1e-6;
+// Rounding of an equation beside the numbers in x, which no step can make smaller.
+constexpr double kRounding = 1e-14;
 // A Jacobian whose smallest singular value is this far below its largest has lost rank.
 constexpr double kRankTolerance = 1e-9;
 // A tangent vector whose squared length is below this beside the ones before it depends on them.
 constexpr double kDependent = 1e-20;
 
-double largest_entry(const std::vector<double>& R) {
-  double largest = 0.0;
-  for (double r : R) {
-    if (!std::isfinite(r)) return HUGE_VAL;
-    largest = std::max(largest, std::abs(r));
+// In four running maxima, which the processor keeps side by side.
+inline double largest_entry(const double* values, int size) {
+  double m0 = 0.0, m1 = 0.0, m2 = 0.0, m3 = 0.0;
+  int i = 0;
+  for (; i + 4 <= size; i += 4) {
+    m0 = std::max(m0, std::abs(values[i]));
+    m1 = std::max(m1, std::abs(values[i + 1]));
+    m2 = std::max(m2, std::abs(values[i + 2]));
+    m3 = std::max(m3, std::abs(values[i + 3]));
   }
-  return largest;
+  for (; i < size; ++i) m0 = std::max(m0, std::abs(values[i]));
+  return std::max(std::max(m0, m1), std::max(m2, m3));
 }
 
 // Gram-Schmidt on the rows, twice for orthogonality to working precision; false when they are dependent.
@@ -47,19 +54,46 @@ bool orthonormalize(double* rows, int count, int n) {
 
 }  // namespace
 
+double distance_to_zero(const double* R, const double* J, int equations, int n, double* row_sizes) {
+  double distance = 0.0;
+  for (int e = 0; e < equations; ++e) {
+    row_sizes[e] = largest_entry(J + static_cast<std::ptrdiff_t>(e) * n, n);
+    const double off = R[e] == 0.0 ? 0.0 : std::abs(R[e]) / row_sizes[e];
+    if (!std::isfinite(off)) return HUGE_VAL;
+    distance = std::max(distance, off);
+  }
+  return distance;
+}
+
 Newton::Newton(System& system, NewtonOptions options)
     : system_(system),
       options_(options),
       solver_(system.tangent_size()),
       R_(system.equation_count()),
       J_(static_cast<std::size_t>(system.equation_count()) * system.tangent_size()),
+      row_sizes_(system.equation_count()),
+      inverse_sizes_(system.equation_count()),
       step_(system.tangent_size()),
       tangents_(static_cast<std::size_t>(system.tangent_size()) * system.dimension()),
       corrections_(tangents_.size()) {}
 
+// R and J at x; the distance to zero.
+double Newton::linearize(const double* x) {
+  const int n = system_.tangent_size(), equations = system_.equation_count();
+  system_.linearize(x, R_.data(), J_.data());
+  residual_ = largest_entry(R_.data(), equations);
+  return distance_to_zero(R_.data(), J_.data(), equations, n, row_sizes_.data());
+}
+
 bool Newton::factorize(const double* Phi) {
   const int n = system_.tangent_size(), equations = system_.equation_count();
-  for (int i = 0; i < equations; ++i) std::copy_n(&J_[static_cast<std::size_t>(i) * n], n, solver_.row(i));
+  for (int i = 0; i < equations; ++i) {
+    const double inverse = row_sizes_[i] > 0.0 ? 1.0 / row_sizes_[i] : 1.0;
+    inverse_sizes_[i] = inverse;
+    const double* const from = &J_[static_cast<std::size_t>(i) * n];
+    double* const row = solver_.row(i);
+    for (int c = 0; c < n; ++c) row[c] = inverse * from[c];
+  }
   for (int i = equations; i < n; ++i) std::copy_n(Phi + static_cast<std::size_t>(i - equations) * n, n, solver_.row(i));
   return solver_.factorize();
 }
@@ -69,16 +103,15 @@ Projection Newton::project(double* x, const double* Phi) {
   bool nearly = false;  // the last factorisation was made nearly at the solution: it finishes the work
   double previous = HUGE_VAL;
   for (int iteration = 0; iteration <= options_.max_iterations; ++iteration) {
-    system_.linearize(x, R_.data(), J_.data());
-    residual_ = largest_entry(R_);
-    if (!std::isfinite(residual_)) return Projection::not_converged;
-    if (nearly && residual_ > 0.1 * previous) nearly = false;
+    const double distance = linearize(x);
+    if (!std::isfinite(distance)) return Projection::not_converged;
+    if (nearly && distance > 0.1 * previous) nearly = false;
     if (!nearly && !factorize(Phi)) return Projection::singular;
-    if (residual_ <= options_.tolerance) return Projection::converged;
-    if (iteration >= 2 && residual_ > 10.0 * previous) return Projection::not_converged;
-    previous = residual_;
-    nearly = nearly || residual_ <= kNearlyZero;
-    std::transform(R_.begin(), R_.end(), step_.begin(), [](double r) { return -r; });
+    if (distance <= tolerance(x)) return Projection::converged;
+    if (iteration >= 2 && distance > 10.0 * previous) return Projection::not_converged;
+    previous = distance;
+    nearly = nearly || distance <= kNearlyZero;
+    for (std::size_t e = 0; e < R_.size(); ++e) step_[e] = -R_[e] * inverse_sizes_[e];
     std::fill(step_.begin() + static_cast<long>(R_.size()), step_.end(), 0.0);
     solver_.solve(step_.data());
     double squared = 0.0;
@@ -87,6 +120,24 @@ Projection Newton::project(double* x, const double* Phi) {
     system_.integrate(x, step_.data(), x);
   }
   return Projection::not_converged;
+}
+
+double Newton::tolerance(const double* x) const {
+  return std::max(options_.tolerance, kRounding * largest_entry(x, system_.configuration_size()));
+}
+
+// Two steps of inverse iteration on A A', from a start that lies along no axis.
+double Newton::regularity() {
+  const int n = system_.tangent_size();
+  for (int i = 0; i < n; ++i) step_[i] = 1.0 + 0.3 * ((5 * i + 2) % 7) - (i % 2 != 0 ? 2.2 : 0.0);
+  double before = 0.0, after = 0.0;
+  for (double* squared : {&before, &after}) {
+    solver_.solve(step_.data());
+    solver_.solve_transposed(step_.data());
+    for (int c = 0; c < n; ++c) *squared += step_[c] * step_[c];
+  }
+  const double smallest = std::sqrt(std::sqrt(before / after));
+  return solver_.determinant_negative() ? -smallest : smallest;
 }
 
 bool Newton::tangent_basis(double* Phi) {
@@ -104,6 +155,8 @@ bool Newton::tangent_basis(double* Phi) {
       const double slope = J_[static_cast<std::size_t>(e) * n + c];
       for (int i = 0; i < k; ++i) correction[e * k + i] += slope * T[c * k + i];
     }
+  for (int e = 0; e < equations; ++e)
+    for (int i = 0; i < k; ++i) correction[e * k + i] *= inverse_sizes_[e];
   solver_.solve(correction, k);
   for (int i = 0; i < k; ++i)
     for (int c = 0; c < n; ++c) Phi[i * n + c] = T[c * k + i] - correction[c * k + i];
@@ -119,15 +172,19 @@ Projection Newton::project_freely(double* x, double* Phi) {
     return Projection::converged;
   }
   for (int iteration = 0; iteration <= options_.max_iterations; ++iteration) {
-    system_.linearize(x, R_.data(), J_.data());
-    residual_ = largest_entry(R_);
-    if (!std::isfinite(residual_)) return Projection::not_converged;
-    const Eigen::Map<const RowMatrix> J(J_.data(), equations, n);
+    const double distance = linearize(x);
+    if (!std::isfinite(distance)) return Projection::not_converged;
+    Eigen::Map<RowMatrix> J(J_.data(), equations, n);
     if (!J.allFinite()) return Projection::not_converged;
+    for (int e = 0; e < equations; ++e) {
+      if (!(row_sizes_[e] > 0.0)) return Projection::singular;
+      J.row(e) /= row_sizes_[e];
+      R_[e] /= row_sizes_[e];
+    }
     const Eigen::JacobiSVD<Matrix> svd(Matrix(J), Eigen::ComputeFullU | Eigen::ComputeFullV);
     const auto& s = svd.singularValues();
     if (!(s(equations - 1) > kRankTolerance * s(0))) return Projection::singular;
-    if (residual_ <= options_.tolerance) {
+    if (distance <= tolerance(x)) {
       basis = svd.matrixV().rightCols(k).transpose();
       return Projection::converged;
     }

@@ -11,14 +11,22 @@ namespace graspatlas {
 enum class Projection { converged, not_converged, singular };
 
 struct NewtonOptions {
-  double tolerance = 1e-11;  ///< largest entry of |R(x)| that counts as zero [-]
+  /// How far from an equation's zero set a point may be, to first order [units of the tangent space]: the largest
+  /// |R_e(x)| beside the largest entry of row e of J(x), so that no equation's scale matters.
+  double tolerance = 1e-11;
   int max_iterations = 10;
 };
+
+/// Largest of |R_e| / max_c |J_ec|: how far a point is from the zero sets of its equations, to first order [units of
+/// the tangent space]. Infinite where a number is not finite, or an equation is off whose row is zero.
+/// `row_sizes` [equations] gets the largest entries of the rows.
+double distance_to_zero(const double* R, const double* J, int equations, int n, double* row_sizes);
 
 /// Orthogonal projection of points of a tangent space onto the manifold: eqs (14) and (15) of the paper.
 ///
 /// Solves [J(x); Phi'] d = -[R(x); 0] and moves x <- x (+) d until R(x) = 0, so that x stays above its
-/// starting point. The last factorisation is kept: it also gives the tangent basis at the point found.
+/// starting point. Rows are divided by their largest entries first: an equation may be multiplied by any number.
+/// The last factorisation is kept: it also gives the tangent basis at the point found.
 class Newton {
  public:
   Newton(System& system, NewtonOptions options);
@@ -37,13 +45,19 @@ class Newton {
 
   double residual() const { return residual_; }  ///< largest entry of |R(x)| at the last point
 
+  /// How near the last factorised [J; Phi'] is to losing rank: about its smallest singular value, rows divided by their
+  /// largest entries, with the sign of its determinant. Beside tangent vectors this is about that of J alone.
+  double regularity();
+
  private:
+  double linearize(const double* x);
   bool factorize(const double* Phi);
+  double tolerance(const double* x) const;
 
   System& system_;
   NewtonOptions options_;
   LinearSolver solver_;
-  std::vector<double> R_, J_, step_, tangents_, corrections_;
+  std::vector<double> R_, J_, row_sizes_, inverse_sizes_, step_, tangents_, corrections_;
   double residual_ = 0.0;
 };
 

@@ -1,0 +1,76 @@
+#include "graspatlas/continuation/neighbour_test.hpp"
+
+#include <algorithm>
+
+namespace graspatlas {
+
+namespace {
+
+// Two charts that are more doubtful than this are neighbours only if the newer leads to the older, and each to the other
+// in grave doubt: see squared_sheet_doubt. Charts of smooth manifolds are mostly below a hundredth.
+constexpr double kDoubt = 0.05, kGraveDoubt = 0.2;
+// A projection from one chart leads to another when it comes as near as this to its centre, and to its tangent space, as
+// shares of the displacement. The first is for the curvature of the configuration space, where coordinates above one
+// centre are not those above another; sheets are apart by half of kDoubt at least.
+constexpr double kMiss = 0.1, kOff = 0.2 * kDoubt;
+
+}  // namespace
+
+NeighbourTest::NeighbourTest(System& system, Newton& newton, double radius, double epsilon)
+    : system_(system),
+      newton_(newton),
+      radius_(radius),
+      epsilon_(epsilon),
+      n_(system.tangent_size()),
+      k_(system.dimension()),
+      displacement_(n_),
+      work_(2 * static_cast<std::size_t>(k_) * k_),
+      step_(n_),
+      above_(system.configuration_size()),
+      miss_(n_),
+      in_chart_(k_) {}
+
+// Eq (17) is a length, which may exceed a chart's own size: then charts on two sides of a fold would cut each other at
+// images far from the middle between them, and leave a gap. So the displacement between the centres, too, may differ
+// from either tangent space by no larger an angle than eq (18) allows between the spaces.
+bool NeighbourTest::passes(const double* x_i, const double* Phi_i, const double* x_j, const double* Phi_j, double* p_ij,
+                           double* p_ji) {
+  system_.difference(x_i, x_j, displacement_.data());
+  const double squared = squared_length(displacement_.data(), n_);
+  if (squared > 4.0 * radius_ * radius_) return false;
+  const double cosine = 1.0 - epsilon_;
+  const double limit = std::min(epsilon_ * epsilon_, (1.0 - cosine * cosine) * squared);
+  if (project_displacement(Phi_i, displacement_.data(), k_, n_, p_ij) > limit) return false;
+  if (project_displacement(Phi_j, displacement_.data(), k_, n_, p_ji) > limit) return false;
+  if (!tangent_spaces_agree(Phi_i, Phi_j, k_, n_, cosine, work_.data())) return false;
+  const double doubt = squared > 0.0 ? squared_sheet_doubt(p_ij, p_ji, work_.data(), squared, k_) : 0.0;
+  for (int a = 0; a < k_; ++a) p_ji[a] = -p_ji[a];
+  // The newer chart was reached from an older one: the way back says more.
+  if (doubt > kDoubt * kDoubt && !leads_to(x_j, Phi_j, p_ji, x_i, Phi_i)) return false;
+  return doubt <= kGraveDoubt * kGraveDoubt || leads_to(x_i, Phi_i, p_ij, x_j, Phi_j);
+}
+
+bool NeighbourTest::leads_to(const double* x_i, const double* Phi_i, const double* p, const double* x_j,
+                             const double* Phi_j) {
+  tangent_vector(Phi_i, p, k_, n_, step_.data());
+  system_.integrate(x_i, step_.data(), above_.data());
+  ++projections_;
+  if (newton_.project(above_.data(), Phi_i) != Projection::converged) return false;
+  system_.difference(above_.data(), x_j, miss_.data());
+  const double squared = squared_length(step_.data(), n_);
+  if (squared_length(miss_.data(), n_) > kMiss * kMiss * squared) return false;
+  return project_displacement(Phi_j, miss_.data(), k_, n_, in_chart_.data()) <= kOff * kOff * squared;
+}
+
+bool NeighbourTest::on_one_sheet(const double* x_i, const double* Phi_i, const double* p, const double* displacement,
+                                 const double* x_j, const double* Phi_j) {
+  const double squared = squared_length(displacement, n_);
+  if (!(squared > 0.0)) return true;
+  project_displacement(Phi_j, displacement, k_, n_, in_chart_.data());
+  if (tangent_spaces_agree(Phi_i, Phi_j, k_, n_, 1.0 - epsilon_, work_.data()) &&
+      squared_sheet_doubt(p, in_chart_.data(), work_.data(), squared, k_) <= kDoubt * kDoubt)
+    return true;
+  return leads_to(x_i, Phi_i, p, x_j, Phi_j);
+}
+
+}  // namespace graspatlas
