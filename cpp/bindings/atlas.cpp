@@ -136,10 +136,13 @@ Checkpoint read_checkpoint(const ArrayTable& table) {
   visit_checkpoint(out, [&table](const char* name, auto& part) { read_array(table, name, part); });
   std::vector<std::int64_t> counts;
   read_array(table, "counts", counts);
-  if (counts.size() != 3) throw Error("the checkpoint's counts must be three");
+  if (counts.size() != 6) throw Error("the checkpoint's counts must be six");
   out.position = counts[0];
   out.next_first = counts[1];
   out.task_count = counts[2];
+  out.audit.rounds = counts[3];
+  out.audit.holes = counts[4];
+  out.audit.new_first = counts[5];
   std::vector<std::int64_t> paused;
   read_array(table, "paused", paused);
   if (paused.size() % 3 != 0) throw Error("the checkpoint's paused tasks must be triples");
@@ -155,8 +158,9 @@ ArrayTable write_checkpoint(const Checkpoint& checkpoint) {
     out[name] = py::array_t<typename std::decay_t<decltype(part)>::value_type>(static_cast<py::ssize_t>(part.size()),
                                                                                part.data());
   });
-  const std::int64_t counts[] = {checkpoint.position, checkpoint.next_first, checkpoint.task_count};
-  out["counts"] = py::array_t<std::int64_t>(3, counts);
+  const std::int64_t counts[] = {checkpoint.position,     checkpoint.next_first,  checkpoint.task_count,
+                                 checkpoint.audit.rounds, checkpoint.audit.holes, checkpoint.audit.new_first};
+  out["counts"] = py::array_t<std::int64_t>(6, counts);
   auto paused = matrix<std::int64_t>(static_cast<py::ssize_t>(checkpoint.paused.size()), 3);
   std::int64_t* numbers = paused.mutable_data();
   for (const PausedTask& task : checkpoint.paused)
@@ -197,6 +201,16 @@ void bind_atlas(py::module_& module) {
       .def("expand", &Atlas::expand, py::arg("chart_limit"), py::arg("seconds"),
            py::call_guard<py::gil_scoped_release>(),
            "Expand until complete, the limit of charts is reached, or the seconds have passed.")
+      .def("audit", &Atlas::audit, py::arg("points"), py::arg("seconds"), py::call_guard<py::gil_scoped_release>(),
+           "Look for points that a complete atlas does not cover, until that is done or the seconds have passed; where "
+           "there is one the atlas is open again.")
+      .def_property_readonly("audited", &Atlas::audited, "True when it is complete, and an audit has ended.")
+      .def_property_readonly(
+          "audit_points", [](const Atlas& atlas) { return atlas.audit_state().points; },
+          "Points of random walks that the last audit found covered; 0 when it was given up.")
+      .def_property_readonly(
+          "audit_holes", [](const Atlas& atlas) { return atlas.audit_state().holes; },
+          "Charts that audits began where nothing was covered.")
       .def_property_readonly("complete", &Atlas::complete, "True when no chart is left to expand.")
       .def_property_readonly("n_open", &Atlas::open_count, "Charts still to be expanded.")
       .def_property_readonly("n_charts", &Atlas::count, "Charts so far.")

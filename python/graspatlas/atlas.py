@@ -22,7 +22,7 @@ from graspatlas.tables import number_array
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-__all__ = ["BOX_TAG", "Atlas", "Closed", "Status"]
+__all__ = ["BOX_TAG", "Atlas", "Audit", "Closed", "Status"]
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -59,6 +59,40 @@ class Closed(int, Enum):
     BOUNDS = 1
     CURVATURE = 2
     NOT_CONVERGED = 3
+    COVERED = 4
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What became of the search for points of the manifold that a complete atlas does not cover.
+
+    The points are those of random walks over the manifold and along its bounds, which begin at charts and then know
+    nothing of them; beside them, every place was looked at where a vertex was closed, and behind every bound that cuts
+    a chart.
+
+    Attributes:
+        points: Points of the last round, all of which a chart covers; 0 where there was none, as for an atlas that was
+            cut short.
+        holes: Charts that were begun at points that none covered, in the rounds before.
+        seconds: Time that it took.
+    """
+
+    points: int
+    holes: int
+    seconds: float
+
+    def share_missing(self, confidence: float = 0.95) -> float:
+        """Largest share of the manifold's points, as random walks come to them, that no chart covers, at this confidence.
+
+        If more were missing, all points of the last round would have been covered with a chance below 1 - confidence. A
+        part that no walk can come to, behind a passage much narrower than a chart, does not count.
+
+        Args:
+            confidence: Between 0 and 1.
+        """
+        if not 0.0 < confidence < 1.0:
+            raise GraspAtlasError(f"confidence must lie between 0 and 1, got {confidence!r}")
+        return float(1.0 - (1.0 - confidence) ** (1.0 / self.points)) if self.points else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +120,7 @@ class Atlas:
     epsilon: float
     status: Status
     seconds: float
+    audit: Audit
     centers: Array
     bases: Array
     residuals: Array
@@ -352,7 +387,7 @@ class Atlas:
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SCALARS}
 
 
-_SCALARS = ("system", "radius", "epsilon", "status", "seconds")
+_SCALARS = ("system", "radius", "epsilon", "status", "seconds", "audit")
 
 
 def shortest_way(normals: Array, excess: Array) -> Array:

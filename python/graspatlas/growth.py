@@ -31,6 +31,10 @@ _COARSE_SHARE = 1 / 30
 _MEMORY_SHARE = 0.8
 
 
+#: Points of random walks that an audit looks up: at least, and as a share of the charts.
+AUDIT_POINTS, AUDIT_SHARE = 300, 1 / 8
+
+
 @dataclass(frozen=True)
 class Limits:
     """Where an atlas is cut short.
@@ -62,6 +66,7 @@ class Growth:
         epsilon: float,
     ) -> None:
         self.builder = builder
+        self.audit_seconds = 0.0
         self._ratio = float(_COARSE_SHARE ** (-1 / system.dimension))
         self._coarse_arguments = (system, x0, self._ratio * radius, epsilon, builder.n_threads)
         self._coarse: _core.AtlasBuilder | None = None
@@ -100,7 +105,7 @@ class Growth:
         )
         builder, start = self.builder, time.perf_counter()
         try:
-            while not builder.complete:
+            while not builder.audited:
                 now = time.perf_counter()
                 if now >= limits.deadline:
                     return Status.TIME_LIMIT
@@ -109,7 +114,12 @@ class Growth:
                 if builder.n_bytes + builder.n_array_bytes > limits.memory:
                     return Status.MEMORY_LIMIT
                 seconds = min(_SLICE_SECONDS, limits.deadline - now)
-                builder.expand(limits.charts, seconds)
+                if builder.complete:
+                    began = time.perf_counter()
+                    builder.audit(max(AUDIT_POINTS, round(AUDIT_SHARE * builder.n_charts)), seconds)
+                    self.audit_seconds += time.perf_counter() - began
+                else:
+                    builder.expand(limits.charts, seconds)
                 if shown and now - start > _QUIET_SECONDS:
                     size = self.expected_size(seconds)
                     bar.set_postfix_str(outlook(builder, size, time.perf_counter() - start), refresh=False)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graspatlas import _core
-from graspatlas.atlas import Atlas
+from graspatlas.atlas import Atlas, Audit
 from graspatlas.checkpoints import CheckpointFolder, run_digest
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasps
@@ -89,9 +89,11 @@ def build_atlas(
     builder = _builder(system, first, (radius, epsilon, workers), folder)
     growth = Growth(builder, system, first, radius, epsilon)
     status = growth.run(Limits(charts, start + seconds, memory), progress, folder)
+    audit = Audit(points=builder.audit_points, holes=builder.audit_holes, seconds=growth.audit_seconds)
+    seconds = time.perf_counter() - start
     arrays = builder.arrays()
     return Atlas(
-        system=system, radius=radius, epsilon=epsilon, status=status, seconds=time.perf_counter() - start, **arrays
+        system=system, radius=radius, epsilon=epsilon, status=status, seconds=seconds, audit=audit, **arrays
     )
 
 

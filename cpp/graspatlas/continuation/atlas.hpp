@@ -9,6 +9,7 @@
 #include <mutex>
 #include <vector>
 
+#include "graspatlas/continuation/auditor.hpp"
 #include "graspatlas/continuation/charts.hpp"
 #include "graspatlas/continuation/checkpoint.hpp"
 #include "graspatlas/continuation/expander.hpp"
@@ -52,6 +53,15 @@ class Atlas {
   std::int64_t count() const { return static_cast<std::int64_t>(order_.size()); }
   int threads() const { return static_cast<int>(workers_.size()); }
 
+  /// Look, for so many seconds, for points of the manifold that a complete atlas does not cover: by at least so many
+  /// points of random walks, along bounds, behind bounds that are not flat, and where vertices were closed. Where there
+  /// is one, a chart begins there and the atlas is open again: expand it, and audit it again. The same for any number
+  /// of threads.
+  void audit(std::int64_t points, double seconds);
+  /// True when the last round of the audit of a complete atlas found it covered, or it was given up.
+  bool audited() const { return complete() && audit_.done; }
+  const AuditState& audit_state() const { return audit_; }
+
   const double* center(std::int64_t i) const { return charts_.center(order_[i]); }
   const double* basis(std::int64_t i) const { return charts_.basis(order_[i]); }
   /// Its facets and neighbours name slots; `number` tells which charts these are.
@@ -73,6 +83,17 @@ class Atlas {
   struct Worker {
     std::unique_ptr<System> system;  // its own, but for the first worker
     std::unique_ptr<Expander> expander;
+    std::unique_ptr<Auditor> auditor;
+  };
+  /// A place that an audit looks at, and what it finds there.
+  struct Look {
+    enum class Kind { rank, closed_vertex, behind_bounds, walk, along_bound } kind;
+    int slot, vertex;
+    std::uint64_t seed;
+    int points = 0;
+    bool loses_rank = false;
+    Closed reason = Closed::open;
+    std::vector<Hole> holes = {};
   };
   /// A chart to expand.
   struct Task {
@@ -102,6 +123,11 @@ class Atlas {
   bool next_generation(Worker& worker);
   void choose_order(Worker& worker);
   void settle_order();
+  void begin_round(std::int64_t points);
+  void add_walks(std::int64_t points, const std::vector<int>& at_bounds);
+  void look(Auditor& auditor, Look& at) const;
+  void end_round();
+  bool add_holes();
   void wait(Lock& lock);
   bool tiny() const;
 
@@ -118,6 +144,10 @@ class Atlas {
   std::vector<int> again_;               // charts that made as many as one task may, or were opened again
   std::vector<PausedTask> paused_;       // tasks that time or the limit of charts cut short; they go on first
   std::int64_t task_count_ = 0;
+
+  AuditState audit_;
+  std::vector<Look> looks_;  // of the round of the audit that is going on
+  std::size_t next_look_ = 0;
 
   // State of one call of expand, guarded by mutex_.
   std::mutex mutex_;

@@ -21,7 +21,8 @@ void check_sizes(const Checkpoint& saved, const System& system) {
                      saved.closed_vertices.size() == m * k && saved.closed_reasons.size() == m &&
                      all_in_range(saved.closed_charts) && all_in_range(saved.generation) && all_in_range(saved.again) &&
                      saved.position >= 0 && saved.position <= static_cast<std::int64_t>(saved.generation.size()) &&
-                     saved.next_first >= 0 && saved.next_first <= static_cast<std::int64_t>(n) && saved.task_count >= 0;
+                     saved.next_first >= 0 && saved.next_first <= static_cast<std::int64_t>(n) && saved.task_count >= 0 && saved.audit.rounds >= 0 &&
+                     saved.audit.new_first >= 0 && saved.audit.new_first <= static_cast<std::int64_t>(n);
   const bool paused_in_range =
       std::all_of(saved.paused.begin(), saved.paused.end(), [&saved](const PausedTask& task) {
         return task.number > 0 && task.number <= saved.task_count && task.turn >= 0 && task.made >= 0 &&
@@ -55,6 +56,7 @@ Checkpoint Atlas::save(std::int64_t first) const {
   for (const int slot : generation_) out.generation.push_back(number(slot));
   for (const int slot : again_) out.again.push_back(number(slot));
   out.paused = paused_;
+  out.audit = audit_;
   out.position = static_cast<std::int64_t>(position_);
   out.next_first = static_cast<std::int64_t>(next_first_);
   out.task_count = task_count_;
@@ -88,6 +90,10 @@ void Atlas::restore(const Checkpoint& saved) {
   next_first_ = static_cast<std::size_t>(saved.next_first);
   task_count_ = saved.task_count;
   paused_ = saved.paused;
+  // Which charts lose rank is not kept: the last round is made again.
+  audit_ = saved.audit;
+  audit_.done = false;
+  audit_.points = 0;
   for (const PausedTask& task : paused_) charts_[generation_[static_cast<std::size_t>(task.turn)]].done = false;
   for (std::size_t turn = position_; turn < turns_.size(); ++turn) charts_[generation_[turns_[turn]]].done = false;
   for (std::size_t i = next_first_; i < order_.size(); ++i) charts_[order_[i]].done = false;

@@ -14,6 +14,15 @@ struct PausedTask {
   std::int32_t made;    ///< charts that it has made
 };
 
+/// How far an audit of an atlas has come; the numbers are those before the round that is going on, or was the last.
+struct AuditState {
+  bool done = false;
+  std::int64_t rounds = 0;         ///< rounds that found holes
+  std::int64_t holes = 0;          ///< charts that were begun at holes
+  std::int64_t new_first = 0;      ///< first chart that came after the last round
+  std::int64_t points = 0;         ///< points of random walks that the last round found covered; 0 when it was given up
+};
+
 /// What an atlas in the making must keep to be made anew, to the bit, without projecting its charts again.
 ///
 /// Polytopes are not kept: charts that are put back in their order cut each other as they did. Charts are named by
@@ -31,6 +40,7 @@ struct Checkpoint {
   /// The generation that is being expanded, how much of it is done, and charts that come again in the next one.
   std::vector<std::int32_t> generation, again;
   std::vector<PausedTask> paused;
+  AuditState audit;
   std::int64_t position = 0, next_first = 0, task_count = 0;
 };
 

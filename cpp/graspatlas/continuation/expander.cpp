@@ -74,6 +74,15 @@ void Expander::put_back(const double* center, const double* basis, double residu
   add_chart(key);
 }
 
+void Expander::start_at(const double* x, const double* Phi, ChartKey key) {
+  x_new_.assign(x, x + x_size_);
+  Phi_new_.assign(Phi, Phi + static_cast<std::ptrdiff_t>(k_) * n_);
+  newton_.project(x_new_.data(), Phi_new_.data());  // for its factorisation
+  residual_new_ = newton_.residual();
+  regularity_new_ = newton_.regularity();
+  add_chart(key);
+}
+
 bool Expander::inside_bounds(const double* x) {
   if (slack_.empty()) return true;
   system_.slack(x, slack_.data());

@@ -13,8 +13,9 @@
 
 namespace graspatlas {
 
-/// Why a vertex could not be expanded. Zero means that it may still be.
-enum class Closed : std::uint8_t { open = 0, bounds = 1, curvature = 2, not_converged = 3 };
+/// Why a vertex could not be expanded. Zero means that it may still be; `covered` that an audit went on there by small
+/// steps, and found it covered.
+enum class Closed : std::uint8_t { open = 0, bounds = 1, curvature = 2, not_converged = 3, covered = 4 };
 
 /// The distance, in radii, of a new chart from the one that it is made from is at most this.
 constexpr double kLongestStep = 1.5;
@@ -44,6 +45,9 @@ class Expander {
 
   /// Adds a chart of an atlas that was saved; all that have smaller keys must be there.
   void put_back(const double* center, const double* basis, double residual, double regularity, ChartKey key);
+
+  /// Adds a chart at a point of the manifold with its tangent basis, which no chart covers.
+  void start_at(const double* x, const double* Phi, ChartKey key);
 
   const double* embedding_of(int slot);
 

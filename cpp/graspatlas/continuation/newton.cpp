@@ -15,6 +15,8 @@ constexpr double kNearlyZero = 1e-6;
 constexpr double kRounding = 1e-14;
 // A Jacobian whose smallest singular value is this far below its largest has lost rank.
 constexpr double kRankTolerance = 1e-9;
+// Numbers of the inverse iteration are made smaller before they overflow.
+constexpr double kLargest = 1e100;
 // A tangent vector whose squared length is below this beside the ones before it depends on them.
 constexpr double kDependent = 1e-20;
 
@@ -126,18 +128,40 @@ double Newton::tolerance(const double* x) const {
   return std::max(options_.tolerance, kRounding * largest_entry(x, system_.configuration_size()));
 }
 
-// Two steps of inverse iteration on A A', from a start that lies along no axis.
-double Newton::regularity() {
+// Inverse iteration on A A', from a start that lies along no axis.
+double Newton::regularity(int iterations) {
   const int n = system_.tangent_size();
   for (int i = 0; i < n; ++i) step_[i] = 1.0 + 0.3 * ((5 * i + 2) % 7) - (i % 2 != 0 ? 2.2 : 0.0);
   double before = 0.0, after = 0.0;
-  for (double* squared : {&before, &after}) {
+  for (int i = 0; i < iterations; ++i) {
     solver_.solve(step_.data());
     solver_.solve_transposed(step_.data());
-    for (int c = 0; c < n; ++c) *squared += step_[c] * step_[c];
+    before = after;
+    after = 0.0;
+    for (int c = 0; c < n; ++c) after += step_[c] * step_[c];
+    if (after > kLargest) {
+      const double shrink = 1.0 / std::sqrt(after);
+      for (int c = 0; c < n; ++c) step_[c] *= shrink;
+      before /= after;
+      after = 1.0;
+    }
   }
   const double smallest = std::sqrt(std::sqrt(before / after));
   return solver_.determinant_negative() ? -smallest : smallest;
+}
+
+bool Newton::hold(const double* x, const double* Phi) { return std::isfinite(linearize(x)) && factorize(Phi); }
+
+bool Newton::approach(double* x) {
+  system_.residual(x, R_.data());
+  double squared = 0.0;
+  for (std::size_t e = 0; e < R_.size(); ++e) step_[e] = -R_[e] * inverse_sizes_[e];
+  std::fill(step_.begin() + static_cast<long>(R_.size()), step_.end(), 0.0);
+  solver_.solve(step_.data());
+  for (const double s : step_) squared += s * s;
+  if (!std::isfinite(squared)) return false;
+  system_.integrate(x, step_.data(), x);
+  return true;
 }
 
 bool Newton::tangent_basis(double* Phi) {

@@ -47,7 +47,14 @@ class Newton {
 
   /// How near the last factorised [J; Phi'] is to losing rank: about its smallest singular value, rows divided by their
   /// largest entries, with the sign of its determinant. Beside tangent vectors this is about that of J alone.
-  double regularity();
+  double regularity(int iterations = 2);
+
+  /// Factorises [J; Phi'] at x, for `approach` and `regularity`. False when it is singular.
+  bool hold(const double* x, const double* Phi);
+
+  /// One step towards the manifold with the factorisation that is held: from a step u away from its point this comes
+  /// within the order of |u|^3. False when a number is not finite.
+  bool approach(double* x);
 
  private:
   double linearize(const double* x);
