@@ -136,13 +136,14 @@ Checkpoint read_checkpoint(const ArrayTable& table) {
   visit_checkpoint(out, [&table](const char* name, auto& part) { read_array(table, name, part); });
   std::vector<std::int64_t> counts;
   read_array(table, "counts", counts);
-  if (counts.size() != 6) throw Error("the checkpoint's counts must be six");
+  if (counts.size() != 7) throw Error("the checkpoint's counts must be seven");
   out.position = counts[0];
   out.next_first = counts[1];
   out.task_count = counts[2];
   out.audit.rounds = counts[3];
   out.audit.holes = counts[4];
   out.audit.new_first = counts[5];
+  out.audit.points = counts[6];
   std::vector<std::int64_t> paused;
   read_array(table, "paused", paused);
   if (paused.size() % 3 != 0) throw Error("the checkpoint's paused tasks must be triples");
@@ -159,8 +160,9 @@ ArrayTable write_checkpoint(const Checkpoint& checkpoint) {
                                                                                part.data());
   });
   const std::int64_t counts[] = {checkpoint.position,     checkpoint.next_first,  checkpoint.task_count,
-                                 checkpoint.audit.rounds, checkpoint.audit.holes, checkpoint.audit.new_first};
-  out["counts"] = py::array_t<std::int64_t>(6, counts);
+                                 checkpoint.audit.rounds, checkpoint.audit.holes, checkpoint.audit.new_first,
+                                 checkpoint.audit.points};
+  out["counts"] = py::array_t<std::int64_t>(7, counts);
   auto paused = matrix<std::int64_t>(static_cast<py::ssize_t>(checkpoint.paused.size()), 3);
   std::int64_t* numbers = paused.mutable_data();
   for (const PausedTask& task : checkpoint.paused)

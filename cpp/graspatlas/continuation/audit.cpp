@@ -81,7 +81,7 @@ void Atlas::begin_round(std::int64_t points) {
     at_bounds.push_back(slot);
     if (static_cast<std::int64_t>(i) >= audit_.new_first) looks_.push_back({Look::Kind::behind_bounds, slot, 0, 0});
   }
-  add_walks(points, at_bounds);
+  if (audit_.points == 0) add_walks(points, at_bounds);
 }
 
 void Atlas::add_walks(std::int64_t points, const std::vector<int>& at_bounds) {
@@ -102,10 +102,14 @@ void Atlas::add_walks(std::int64_t points, const std::vector<int>& at_bounds) {
   }
 }
 
+// What walks have found covered stays so: they are made again only when one of them found a hole.
 void Atlas::end_round() {
   std::int64_t points = 0;
+  bool walks_found = false;
   for (const Look& at : looks_) {
     points += at.points;
+    if (at.kind == Look::Kind::walk || at.kind == Look::Kind::along_bound)
+      walks_found = walks_found || !at.holes.empty();
     if (at.kind == Look::Kind::rank) charts_[at.slot].nearly_singular = at.loses_rank;
     if (at.kind == Look::Kind::closed_vertex)
       charts_[at.slot].polytope.close(at.vertex, static_cast<std::uint8_t>(at.reason));
@@ -114,15 +118,12 @@ void Atlas::end_round() {
   const bool found = add_holes();
   looks_.clear();
   looks_.shrink_to_fit();
-  if (!found) {
-    audit_.done = true;
-    audit_.points = points;
-  } else if (audit_.rounds < kMostRounds) {
-    ++audit_.rounds;
-    audit_.new_first = charts;
-  } else {
-    audit_.done = true;
-  }
+  if (audit_.points == 0 && !walks_found) audit_.points = points;
+  audit_.done = !found || audit_.rounds >= kMostRounds;
+  if (found && audit_.done) audit_.points = 0;
+  if (audit_.done) return;
+  ++audit_.rounds;
+  audit_.new_first = charts;
 }
 
 // Begins charts at the holes that were found, but for those that one of them covers by now.

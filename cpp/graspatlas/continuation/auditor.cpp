@@ -9,7 +9,7 @@ namespace {
 
 // How far outside a polytope a covered point may lie, as a share of the radius: flat charts of a curved manifold leave
 // slivers between them.
-constexpr double kSliver = 0.1;
+constexpr double kSliver = 0.15;
 // Random walks: steps of one, and the least and the greatest length of a step as shares of the radius.
 constexpr int kWalkSteps = 6;
 constexpr double kShortest = 0.05, kLongest = 1.5;
@@ -24,7 +24,7 @@ constexpr double kMarchStep = 0.25, kShortestMarch = 1.0 / 4096.0;
 constexpr int kMarchSteps = 400;
 // Regularity, as a share of that at the centre, at which a chart loses rank; how far away, in radii; steps of the search.
 constexpr double kRankLost = 0.1, kRankReach = 1.5;
-constexpr int kRankSteps = 5, kRankIterations = 8;
+constexpr int kRankSteps = 5, kRankIterations = 4;
 // A step of the differences that regularity is derived by, as a share of the radius.
 constexpr double kDifference = 1e-3;
 // A centre may miss a bound by rounding only.
@@ -106,10 +106,12 @@ class Auditor::Walker {
     std::copy_n(basis, Phi.size(), Phi.begin());
   }
 
-  /// To the point of the manifold nearest a point. False when there is none, or it is outside the bounds.
-  bool put_near(const double* point) {
-    std::copy_n(point, x.size(), x.begin());
-    return newton.project_freely(x.data(), Phi.data()) == Projection::converged && inside(x.data());
+  /// To the point of the manifold above a point, where about this is the tangent basis. False when there is none, or it
+  /// is outside the bounds.
+  bool put_above(const double* point, const double* basis) {
+    put(point, basis);
+    return newton.project(x.data(), basis) == Projection::converged && inside(x.data()) &&
+           newton.tangent_basis(Phi.data());
   }
 
   enum class Step { taken, out_of_bounds, failed };
@@ -185,17 +187,22 @@ Auditor::~Auditor() = default;
 
 bool Auditor::covers(const double* x, const double* Phi) {
   system_.embed(x, embedding_.data());
-  charts_.near(embedding_.data(), 2.0 * options_.radius, near_, near_scratch_);
-  for (const int slot : near_) {
-    system_.difference(charts_.center(slot), x, displacement_.data());
-    const double off =
-        project_displacement(charts_.basis(slot), displacement_.data(), k_, n_, u_.data());
-    if (off > options_.epsilon * options_.epsilon) continue;
-    if (!charts_[slot].polytope.contains(u_.data(), kSliver * options_.radius)) continue;
-    if (walker_->test.on_one_sheet(charts_.center(slot), charts_.basis(slot), u_.data(), displacement_.data(), x, Phi))
-      return true;
+  // Mostly it is one of the nearest.
+  for (const double reach : {0.8 * options_.radius, 2.0 * options_.radius}) {
+    charts_.near(embedding_.data(), reach, near_, near_scratch_);
+    for (const int slot : near_)
+      if (covers(slot, x, Phi)) return true;
   }
   return false;
+}
+
+bool Auditor::covers(int slot, const double* x, const double* Phi) {
+  const double *center = charts_.center(slot), *basis = charts_.basis(slot);
+  system_.difference(center, x, displacement_.data());
+  const double off = project_displacement(basis, displacement_.data(), k_, n_, u_.data());
+  return off <= options_.epsilon * options_.epsilon &&
+         charts_[slot].polytope.contains(u_.data(), kSliver * options_.radius) &&
+         walker_->test.on_one_sheet(center, basis, u_.data(), displacement_.data(), x, Phi);
 }
 
 // False when no chart covers the point, which then is a hole.
@@ -228,14 +235,14 @@ int Auditor::random_steps(Walker& walker, Dice& dice, bool on_bound, std::vector
       std::fill(walker.heading.begin(), walker.heading.end(), 0.0);
       continue;
     }
-    const double* Phi = walker.Phi.data();
-    if (on_bound) {  // the walker's basis is that of the bound
-      std::copy_n(walker.x.data(), x_size_, x_.begin());
-      if (walker_->newton.project_freely(x_.data(), Phi_.data()) != Projection::converged) continue;
-      Phi = Phi_.data();
+    if (on_bound) {  // the walker's basis is that of the bound: the whole one comes along beside it
+      walker_->x = walker.x;
+      if (walker_->newton.project(walker_->x.data(), walker_->Phi.data()) != Projection::converged ||
+          !walker_->newton.tangent_basis(walker_->Phi.data()))
+        break;
     }
     ++points;
-    if (!look_up(on_bound ? x_.data() : walker.x.data(), Phi, holes)) break;
+    if (!look_up(walker_->x.data(), walker_->Phi.data(), holes)) break;
   }
   return points;
 }
@@ -265,8 +272,27 @@ int Auditor::walk_along_bound(int slot, std::uint64_t seed, std::vector<Hole>& h
   tangent_vector(charts_.basis(slot), &samples_[static_cast<std::size_t>(sample) * k_], k_, n_, step_.data());
   system_.integrate(charts_.center(slot), step_.data(), x_.data());
   Walker& walker = bound_walker(Polytope::bound_of(polytope.tag(chosen)));
-  if (!walker.put_near(x_.data())) return 0;
+  tangent_vectors_across(polytope.normal(chosen), charts_.basis(slot));
+  if (!walker.put_above(x_.data(), Phi_.data())) return 0;
+  walker_->put(x_.data(), charts_.basis(slot));
   return random_steps(walker, dice, true, holes);
+}
+
+// Into Phi_: an orthonormal basis [k - 1 x n] of the tangent vectors at right angles to that with coordinates `normal`,
+// a unit vector: the reflection that moves an axis onto the normal moves the other axes there.
+void Auditor::tangent_vectors_across(const double* normal, const double* basis) {
+  int axis = 0;
+  for (int c = 1; c < k_; ++c)
+    if (std::abs(normal[c]) > std::abs(normal[axis])) axis = c;
+  const double sign = normal[axis] < 0.0 ? -1.0 : 1.0;
+  for (int i = 0, row = 0; i < k_; ++i) {
+    if (i == axis) continue;
+    for (int c = 0; c < k_; ++c) {
+      const double w = normal[c] + (c == axis ? sign : 0.0);
+      u_[c] = (c == i ? 1.0 : 0.0) - w * normal[i] / (1.0 + std::abs(normal[axis]));
+    }
+    tangent_vector(basis, u_.data(), k_, n_, &Phi_[static_cast<std::size_t>(row++) * n_]);
+  }
 }
 
 // Into samples_: the centre of a facet's vertices, and the middles between it and them.
@@ -381,9 +407,8 @@ bool Auditor::loses_rank(int slot) {
       direction_[a] = (value - regularity_at(x_.data(), walker_->Phi.data())) / h;
     }
     const double slope = std::sqrt(squared_length(direction_.data(), k_));
-    const double left = kRankReach * options_.radius - come;
-    double length = std::min(value / std::max(slope, 1e-300), left);
-    if (!(length > 0.0)) return false;
+    double length = value / std::max(slope, 1e-300);
+    if (!(length > 0.0) || come + length > kRankReach * options_.radius) return false;
     auto taken = walker_->step(direction_.data(), length);
     for (int halving = 0; taken != Walker::Step::taken && halving < kHalvings; ++halving)
       taken = walker_->step(direction_.data(), length *= 0.5);

@@ -66,9 +66,11 @@ class Auditor {
   /// A place on a manifold, and the system and work space that moves it.
   class Walker;
 
+  bool covers(int slot, const double* x, const double* Phi);
   bool look_up(const double* x, const double* Phi, std::vector<Hole>& holes);
   bool march(Walker& walker, const double* direction, double reach, std::vector<Hole>& holes);
   int random_steps(Walker& walker, Dice& dice, bool on_bound, std::vector<Hole>& holes);
+  void tangent_vectors_across(const double* normal, const double* basis);
   void facet_samples(const Polytope& polytope, int facet);
   Walker& bound_walker(int bound);
   double regularity_at(const double* x, const double* Phi);

@@ -20,7 +20,7 @@ struct AuditState {
   std::int64_t rounds = 0;         ///< rounds that found holes
   std::int64_t holes = 0;          ///< charts that were begun at holes
   std::int64_t new_first = 0;      ///< first chart that came after the last round
-  std::int64_t points = 0;         ///< points of random walks that the last round found covered; 0 when it was given up
+  std::int64_t points = 0;         ///< points of random walks, all found covered; 0 before that, or when it was given up
 };
 
 /// What an atlas in the making must keep to be made anew, to the bit, without projecting its charts again.
