@@ -133,6 +133,7 @@ double Newton::regularity(int iterations) {
   const int n = system_.tangent_size();
   for (int i = 0; i < n; ++i) step_[i] = 1.0 + 0.3 * ((5 * i + 2) % 7) - (i % 2 != 0 ? 2.2 : 0.0);
   double before = 0.0, after = 0.0;
+  for (int c = 0; c < n; ++c) after += step_[c] * step_[c];
   for (int i = 0; i < iterations; ++i) {
     solver_.solve(step_.data());
     solver_.solve_transposed(step_.data());

@@ -47,7 +47,7 @@ class Newton {
 
   /// How near the last factorised [J; Phi'] is to losing rank: about its smallest singular value, rows divided by their
   /// largest entries, with the sign of its determinant. Beside tangent vectors this is about that of J alone.
-  double regularity(int iterations = 2);
+  double regularity(int iterations = 1);
 
   /// Factorises [J; Phi'] at x, for `approach` and `regularity`. False when it is singular.
   bool hold(const double* x, const double* Phi);
