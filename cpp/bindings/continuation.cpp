@@ -103,6 +103,13 @@ py::array_t<double> vector(const std::vector<double>& values) {
 
 void bind_systems(py::module_& module) {
   py::class_<System, py::smart_holder>(module, "AnySystem", "Equations R(x) = 0 on a configuration space.")
+      .def("__repr__",
+           [](const py::object& self) {
+             const System& s = self.cast<const System&>();
+             return "<" + py::type::of(self).attr("__name__").cast<std::string>() + ": " +
+                    std::to_string(s.tangent_size()) + " unknowns, " + std::to_string(s.equation_count()) +
+                    " equations>";
+           })
       .def_property_readonly("configuration_size", &System::configuration_size, "Numbers in a point x.")
       .def_property_readonly("tangent_size", &System::tangent_size, "Numbers in a tangent vector v.")
       .def_property_readonly("n_equations", &System::equation_count, "Numbers in R(x).")
