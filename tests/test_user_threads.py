@@ -1,4 +1,4 @@
-"""Any number of the user's threads may use one problem, system, atlas or result: answers are those of one, to the bit."""
+"""Any number of the user's threads may use one problem, atlas or result: answers are those of one, to the bit."""
 
 from __future__ import annotations
 
@@ -180,7 +180,14 @@ def test_what_is_computed_on_first_use():
     def ask(problem: ga.Problem, atlas: ga.Atlas) -> list[Any]:
         grasps = ga.Grasps(problem, atlas.centers)
         full = [problem.full_dimension, problem.x1_array, list(problem.hand.joint_limits), problem.hand.mechanism.A]
-        return [*full, grasps.semi_axes, grasps.J, atlas.volumes, list(atlas.neighbours), atlas.locate(atlas.centers[5])]
+        return [
+            *full,
+            grasps.semi_axes,
+            grasps.J,
+            atlas.volumes,
+            list(atlas.neighbours),
+            atlas.locate(atlas.centers[5]),
+        ]
 
     alone = bits(ask(made.problem, made.atlas))
     for _ in range(5):

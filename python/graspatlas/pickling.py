@@ -40,8 +40,8 @@ def reduced(thing: Any, base: type, arguments: tuple[Any, ...]) -> tuple[Callabl
     return rebuild, (type(thing), base, arguments), state or None
 
 
-def rebuild(cls: type, base: type, arguments: tuple[Any, ...]) -> Any:
+def rebuild(cls: Any, base: Any, arguments: tuple[Any, ...]) -> Any:
     """An object of a class, the compiled part of which is made from these arguments; see :func:`reduced`."""
     thing = cls.__new__(cls)
-    base.__init__(thing, *arguments)  # type: ignore[misc]
+    base.__init__(thing, *arguments)
     return thing
