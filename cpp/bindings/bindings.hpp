@@ -20,6 +20,21 @@ pybind11::array_t<T> matrix(pybind11::ssize_t rows, pybind11::ssize_t columns) {
   return pybind11::array_t<T>(std::vector<pybind11::ssize_t>{rows, columns});
 }
 
+/// What __reduce__ returns.
+using Reduced = pybind11::typing::Tuple<pybind11::object, pybind11::ellipsis>;
+
+/// What __reduce__ returns for an object of a compiled class, or of its subclass in Python; see graspatlas/pickling.py.
+Reduced reduced(const pybind11::object& self, const pybind11::type& base, const pybind11::tuple& arguments);
+
+/// __reduce__ of the class C: its objects are pickled and copied by the arguments of its constructor, which
+/// `arguments(object)` returns as a tuple.
+template <class C, class Arguments>
+auto by_arguments(Arguments arguments) {
+  return [arguments](const pybind11::object& self) -> Reduced {
+    return reduced(self, pybind11::type::of<C>(), arguments(self.cast<const C&>()));
+  };
+}
+
 void bind_continuation(pybind11::module_& module);
 void bind_atlas(pybind11::module_& module);
 void bind_grasp(pybind11::module_& module);

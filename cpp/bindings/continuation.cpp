@@ -6,6 +6,7 @@
 #include <string>
 
 #include "bindings.hpp"
+#include "graspatlas/continuation/lease.hpp"
 #include "graspatlas/continuation/neighbours.hpp"
 #include "graspatlas/continuation/newton.hpp"
 #include "graspatlas/continuation/polytope.hpp"
@@ -58,12 +59,14 @@ class PythonSystem : public System, public py::trampoline_self_life_support {
       out[b] = bounds_[b].limit - bounds_[b].sign * x[bounds_[b].variable];
   }
 
- private:
+  /// sign x <= limit for one variable.
   struct Bound {
     int variable;
     double sign, limit;
   };
+  const std::vector<Bound>& bounds() const { return bounds_; }
 
+ private:
   void call(const char* method, const double* x, const std::vector<py::ssize_t>& shape, double* out) {
     const py::function function = py::get_override(this, method);
     if (!function) throw Error(std::string("a System needs a method ") + method + "(x)");
@@ -80,6 +83,14 @@ class PythonSystem : public System, public py::trampoline_self_life_support {
   std::vector<Bound> bounds_;
 };
 
+/// Lower or upper bounds of all variables [n].
+py::array_t<double> bounds_of(const PythonSystem& system, double sign) {
+  std::vector<double> out(static_cast<std::size_t>(system.tangent_size()), sign * HUGE_VAL);
+  for (const PythonSystem::Bound& bound : system.bounds())
+    if (bound.sign == sign) out[static_cast<std::size_t>(bound.variable)] = sign * bound.limit;
+  return py::array_t<double>(static_cast<py::ssize_t>(out.size()), out.data());
+}
+
 py::array_t<double> copied(const double* data, py::ssize_t rows, py::ssize_t columns) {
   auto out = matrix<double>(rows, columns);
   std::copy_n(data, rows * columns, out.mutable_data());
@@ -92,6 +103,13 @@ py::array_t<double> vector(const std::vector<double>& values) {
 
 void bind_systems(py::module_& module) {
   py::class_<System, py::smart_holder>(module, "AnySystem", "Equations R(x) = 0 on a configuration space.")
+      .def("__repr__",
+           [](const py::object& self) {
+             const System& s = self.cast<const System&>();
+             return "<" + py::type::of(self).attr("__name__").cast<std::string>() + ": " +
+                    std::to_string(s.tangent_size()) + " unknowns, " + std::to_string(s.equation_count()) +
+                    " equations>";
+           })
       .def_property_readonly("configuration_size", &System::configuration_size, "Numbers in a point x.")
       .def_property_readonly("tangent_size", &System::tangent_size, "Numbers in a tangent vector v.")
       .def_property_readonly("n_equations", &System::equation_count, "Numbers in R(x).")
@@ -104,7 +122,7 @@ void bind_systems(py::module_& module) {
           "evaluate_residual",
           [](System& s, const DoubleArray& x) {
             std::vector<double> R(s.equation_count());
-            s.residual(checked_vector(x, s.configuration_size(), "x"), R.data());
+            Lease(s)->residual(checked_vector(x, s.configuration_size(), "x"), R.data());
             return vector(R);
           },
           py::arg("x"), "R(x) [n_equations].")
@@ -113,7 +131,7 @@ void bind_systems(py::module_& module) {
           [](System& s, const DoubleArray& x) {
             std::vector<double> R(s.equation_count());
             auto J = matrix<double>(s.equation_count(), s.tangent_size());
-            s.linearize(checked_vector(x, s.configuration_size(), "x"), R.data(), J.mutable_data());
+            Lease(s)->linearize(checked_vector(x, s.configuration_size(), "x"), R.data(), J.mutable_data());
             return J;
           },
           py::arg("x"), "J(x) [n_equations x tangent_size], derivative of R(x (+) v) at v = 0.")
@@ -153,14 +171,23 @@ void bind_systems(py::module_& module) {
           py::arg("x"), "Distance of x from each bound; negative outside.");
   py::class_<PythonSystem, System, py::smart_holder>(module, "PythonSystem", "Base of systems written in Python.")
       .def(py::init<int, int, const DoubleArray&, const DoubleArray&>(), py::arg("n_variables"), py::arg("n_equations"),
-           py::arg("lower"), py::arg("upper"));
+           py::arg("lower"), py::arg("upper"))
+      .def("__reduce__", by_arguments<PythonSystem>([](const PythonSystem& s) {
+             return py::make_tuple(s.tangent_size(), s.equation_count(), bounds_of(s, -1.0), bounds_of(s, 1.0));
+           }));
   py::class_<Sphere, System, py::smart_holder>(module, "Sphere", "The unit sphere in R^n.")
-      .def(py::init<int>(), py::arg("n"));
+      .def(py::init<int>(), py::arg("n"))
+      .def("__reduce__", by_arguments<Sphere>([](const Sphere& s) { return py::make_tuple(s.tangent_size()); }));
   py::class_<Torus, System, py::smart_holder>(module, "Torus", "A torus in R^3.")
-      .def(py::init<double, double>(), py::arg("major_radius"), py::arg("minor_radius"));
+      .def(py::init<double, double>(), py::arg("major_radius"), py::arg("minor_radius"))
+      .def("__reduce__",
+           by_arguments<Torus>([](const Torus& s) { return py::make_tuple(s.major_radius(), s.minor_radius()); }));
   py::class_<Angles, System, py::smart_holder>(module, "Angles", "n angles, no equation.")
-      .def(py::init<int>(), py::arg("n"));
-  py::class_<Rotations, System, py::smart_holder>(module, "Rotations", "All rotations, no equation.").def(py::init<>());
+      .def(py::init<int>(), py::arg("n"))
+      .def("__reduce__", by_arguments<Angles>([](const Angles& s) { return py::make_tuple(s.tangent_size()); }));
+  py::class_<Rotations, System, py::smart_holder>(module, "Rotations", "All rotations, no equation.")
+      .def(py::init<>())
+      .def("__reduce__", by_arguments<Rotations>([](const Rotations&) { return py::make_tuple(); }));
 }
 
 void bind_parts(py::module_& module) {
@@ -222,7 +249,8 @@ void bind_continuation(py::module_& module) {
         for (int a = 0; a < k; ++a)
           for (int c = 0; c < n; ++c) step[c] += coordinates[a] * Phi.data()[static_cast<py::ssize_t>(a) * n + c];
         system.integrate(center, step.data(), out.data());
-        Newton newton(system, NewtonOptions());
+        const Lease own(system);
+        Newton newton(*own, NewtonOptions());
         if (newton.project(out.data(), Phi.data()) != Projection::converged) return py::object(py::none());
         return py::object(vector(out));
       },

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "bindings.hpp"
+#include "graspatlas/continuation/lease.hpp"
 #include "graspatlas/grasp/bspline_patch.hpp"
 #include "graspatlas/grasp/derived_patch.hpp"
 #include "graspatlas/grasp/grasp_system.hpp"
@@ -39,10 +40,21 @@ ObjectJoint object_joint_from(const std::string& name) {
   throw Error("the object's joint is 'free_flyer', 'planar' or 'none', not '" + name + "'");
 }
 
+const char* name_of(ObjectJoint joint) {
+  return joint == ObjectJoint::free_flyer ? "free_flyer" : joint == ObjectJoint::planar ? "planar" : "none";
+}
+
 ParameterUnit unit_from(const std::string& name) {
   if (name == "number") return ParameterUnit::number;
   if (name == "m") return ParameterUnit::length;
   throw Error("the unit of a B-spline's parameters is 'number' or 'm', not '" + name + "'");
+}
+
+const char* name_of(ParameterUnit unit) { return unit == ParameterUnit::length ? "m" : "number"; }
+
+/// For Python, whose objects are not const: it cannot change a patch.
+std::shared_ptr<Patch> shared(const std::shared_ptr<const Patch>& patch) {
+  return std::const_pointer_cast<Patch>(patch);
 }
 
 using Stack = py::array_t<double>;
@@ -56,7 +68,9 @@ py::ssize_t checked_rows(const GraspSystem& system, const DoubleArray& X) {
   return X.shape(0);
 }
 
-ArrayTable grasp_arrays(GraspSystem& system, const DoubleArray& X) {
+ArrayTable grasp_arrays(GraspSystem& shared, const DoubleArray& X) {
+  const Lease own(shared);
+  GraspSystem& system = *own;
   const py::ssize_t n = checked_rows(system, X), m = system.contact_count(), dof = system.object_dof();
   const py::ssize_t drives = system.drive_count();
   Stack hand_points = stack({n, m, 3}), object_points = stack({n, m, 3}), hand_normals = stack({n, m, 3}),
@@ -107,6 +121,8 @@ void bind_model(py::module_& module) {
              return std::make_unique<Model>(urdf, object_joint_from(object));
            }),
            py::arg("urdf"), py::arg("object_joint"))
+      .def("__reduce__",
+           by_arguments<Model>([](const Model& m) { return py::make_tuple(m.urdf(), name_of(m.object_kind())); }))
       .def_property_readonly("q_size", &Model::q_size, "Numbers in q.")
       .def_property_readonly("v_size", &Model::v_size, "Numbers in a velocity.")
       .def_property_readonly("hand_q_size", &Model::hand_q_size, "Numbers in the hand's part of q.")
@@ -156,25 +172,36 @@ void bind_patches(py::module_& module) {
           py::arg("u"), py::arg("v"), "Point o, normal m, tangents a and b, and their derivatives by u and v.");
   py::class_<PlanePatch, Patch, py::smart_holder>(module, "PlanePatch", "The x-z plane of a placement, normal y.")
       .def(py::init([](const Eigen::Matrix4d& T) { return std::make_unique<PlanePatch>(placement_from(T)); }),
-           py::arg("T"));
+           py::arg("T"))
+      .def("__reduce__",
+           by_arguments<PlanePatch>([](const PlanePatch& p) { return py::make_tuple(matrix_from(p.placement())); }));
   py::class_<RevolutionPatch, Patch, py::smart_holder>(module, "RevolutionPatch",
                                                        "A surface of revolution about y of a placement.")
       .def(py::init([](const Eigen::Matrix4d& T, const std::vector<double>& breaks, const Cubics& coefficients) {
              return std::make_unique<RevolutionPatch>(placement_from(T), breaks, coefficients);
            }),
-           py::arg("T"), py::arg("breaks"), py::arg("coefficients"));
+           py::arg("T"), py::arg("breaks"), py::arg("coefficients"))
+      .def("__reduce__", by_arguments<RevolutionPatch>([](const RevolutionPatch& p) {
+             return py::make_tuple(matrix_from(p.placement()), p.outline().breaks(), p.outline().coefficients());
+           }));
   py::class_<TorusPatch, Patch, py::smart_holder>(module, "TorusPatch",
                                                   "A torus about y of a placement; a sphere with a ring of radius 0.")
       .def(py::init([](const Eigen::Matrix4d& T, double ring, double tube) {
              return std::make_unique<TorusPatch>(placement_from(T), ring, tube);
            }),
-           py::arg("T"), py::arg("ring_radius"), py::arg("tube_radius"));
+           py::arg("T"), py::arg("ring_radius"), py::arg("tube_radius"))
+      .def("__reduce__", by_arguments<TorusPatch>([](const TorusPatch& p) {
+             return py::make_tuple(matrix_from(p.placement()), p.ring_radius(), p.tube_radius());
+           }));
   py::class_<EllipsoidPatch, Patch, py::smart_holder>(module, "EllipsoidPatch",
                                                       "An ellipsoid with its semi-axes along x, y, z of a placement.")
       .def(py::init([](const Eigen::Matrix4d& T, const Eigen::Vector3d& semi_axes) {
              return std::make_unique<EllipsoidPatch>(placement_from(T), semi_axes);
            }),
-           py::arg("T"), py::arg("semi_axes"));
+           py::arg("T"), py::arg("semi_axes"))
+      .def("__reduce__", by_arguments<EllipsoidPatch>([](const EllipsoidPatch& p) {
+             return py::make_tuple(matrix_from(p.placement()), p.semi_axes());
+           }));
   py::class_<BSplinePatch, Patch, py::smart_holder>(module, "BSplinePatch", "A tensor-product B-spline.")
       .def(py::init([](std::pair<int, int> degrees, const std::vector<double>& u_knots,
                        const std::vector<double>& v_knots, const Points3& control_points, const std::string& unit) {
@@ -182,25 +209,48 @@ void bind_patches(py::module_& module) {
                                                    BSplineBasis(degrees.second, v_knots), control_points,
                                                    unit_from(unit));
            }),
-           py::arg("degrees"), py::arg("u_knots"), py::arg("v_knots"), py::arg("control_points"), py::arg("unit"));
+           py::arg("degrees"), py::arg("u_knots"), py::arg("v_knots"), py::arg("control_points"), py::arg("unit"))
+      .def("__reduce__", by_arguments<BSplinePatch>([](const BSplinePatch& p) {
+             return py::make_tuple(py::make_tuple(p.u().degree(), p.v().degree()), p.u().knots(), p.v().knots(),
+                                   Points3(p.control_points().transpose()), name_of(p.u_unit()));
+           }));
   py::class_<FlippedPatch, Patch, py::smart_holder>(module, "FlippedPatch", "A patch with the opposite normal.")
       .def(py::init([](std::shared_ptr<Patch> patch) { return std::make_unique<FlippedPatch>(std::move(patch)); }),
-           py::arg("patch"));
+           py::arg("patch"))
+      .def("__reduce__",
+           by_arguments<FlippedPatch>([](const FlippedPatch& p) { return py::make_tuple(shared(p.patch())); }));
   py::class_<CurvePatch, Patch, py::smart_holder>(module, "CurvePatch", "A curve u(s), v(s) on a patch.")
       .def(py::init(
                [](std::shared_ptr<Patch> patch, const std::vector<double>& breaks, const Cubics& u, const Cubics& v) {
                  return std::make_unique<CurvePatch>(std::move(patch), PiecewiseCubic(breaks, u, "a curve"),
                                                      PiecewiseCubic(breaks, v, "a curve"));
                }),
-           py::arg("patch"), py::arg("breaks"), py::arg("u"), py::arg("v"));
+           py::arg("patch"), py::arg("breaks"), py::arg("u"), py::arg("v"))
+      .def("__reduce__", by_arguments<CurvePatch>([](const CurvePatch& p) {
+             return py::make_tuple(shared(p.patch()), p.u().breaks(), p.u().coefficients(), p.v().coefficients());
+           }));
   py::class_<PatchParameter>(module, "PatchParameter", "One parameter of a patch: frozen, or an unknown.")
       .def(py::init<bool, double, bool, double, double>(), py::arg("free"), py::arg("value"), py::arg("periodic"),
-           py::arg("lower"), py::arg("upper"));
+           py::arg("lower"), py::arg("upper"))
+      .def("__reduce__", by_arguments<PatchParameter>([](const PatchParameter& p) {
+             return py::make_tuple(p.free, p.value, p.periodic, p.lower, p.upper);
+           }));
   py::class_<ContactSide>(module, "ContactSide", "A patch on a joint of the model.")
       .def(py::init(
                [](int joint, const Eigen::Matrix4d& T, std::shared_ptr<Patch> patch, const PatchParameter& u,
                   const PatchParameter& v) { return ContactSide{joint, placement_from(T), std::move(patch), u, v}; }),
-           py::arg("joint"), py::arg("T_joint_frame"), py::arg("patch"), py::arg("u"), py::arg("v"));
+           py::arg("joint"), py::arg("T_joint_frame"), py::arg("patch"), py::arg("u"), py::arg("v"))
+      .def("__reduce__", by_arguments<ContactSide>([](const ContactSide& c) {
+             return py::make_tuple(c.joint, matrix_from(c.frame), shared(c.patch), c.u, c.v);
+           }));
+}
+
+/// The arguments of a system's constructor.
+py::tuple arguments_of(const GraspSystem& system) {
+  py::list sides;
+  for (const Contact& contact : system.contacts()) sides.append(py::make_tuple(contact.hand, contact.object));
+  return py::make_tuple(std::make_shared<Model>(system.model()), sides, Matrix(system.motions()), system.length_scale(),
+                        system.lower_limits(), system.upper_limits(), Matrix(system.drives()));
 }
 
 }  // namespace
@@ -210,17 +260,20 @@ void bind_grasp(py::module_& module) {
   bind_patches(module);
   py::class_<GraspSystem, System, py::smart_holder>(module, "GraspSystem",
                                                     "The relevant grasps R of a hand and an object.")
-      .def(py::init([](std::shared_ptr<Model> model, const std::vector<std::pair<ContactSide, ContactSide>>& sides,
-                       const Matrix& motions, double length_scale, const std::vector<double>& lower,
-                       const std::vector<double>& upper, const std::optional<Matrix>& drives) {
+      .def(py::init([](const std::shared_ptr<Model>& model,
+                       const std::vector<std::pair<ContactSide, ContactSide>>& sides, const Matrix& motions,
+                       double length_scale, const std::vector<double>& lower, const std::vector<double>& upper,
+                       const std::optional<Matrix>& drives) {
              std::vector<Contact> contacts;
              for (const auto& [hand, object] : sides) contacts.push_back({hand, object});
              const int h = model->hand_v_size();
-             return std::make_unique<GraspSystem>(std::move(model), std::move(contacts), motions, length_scale, lower,
-                                                  upper, drives.value_or(Matrix::Identity(h, h)));
+             // A model of its own: Python may use the other at any time.
+             return std::make_unique<GraspSystem>(std::make_shared<Model>(*model), std::move(contacts), motions,
+                                                  length_scale, lower, upper, drives.value_or(Matrix::Identity(h, h)));
            }),
            py::arg("model"), py::arg("contacts"), py::arg("motions"), py::arg("length_scale"), py::arg("lower"),
            py::arg("upper"), py::arg("drives") = py::none())
+      .def("__reduce__", by_arguments<GraspSystem>(arguments_of))
       .def_property_readonly("n_contacts", &GraspSystem::contact_count, "Number of contacts.")
       .def_property_readonly("n_parameters", &GraspSystem::parameter_count, "Free patch parameters.")
       .def_property_readonly(

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bindings.hpp"
+#include "graspatlas/continuation/lease.hpp"
 #include "graspatlas/parallel.hpp"
 #include "graspatlas/quality/force_closure.hpp"
 #include "graspatlas/quality/manipulability.hpp"
@@ -72,21 +73,23 @@ py::array_t<double> evaluate_rows(py::ssize_t n, const Make& make) {
   return out;
 }
 
-/// A system of its own for each worker but the first.
-std::shared_ptr<GraspSystem> system_of(GraspSystem& system, int worker) {
-  if (worker == 0) return {&system, [](GraspSystem*) {}};
-  return std::shared_ptr<GraspSystem>(static_cast<GraspSystem*>(system.clone().release()));
-}
+/// A measure of grasps with a system of its own to read them from, for one worker.
+template <class Measure>
+struct Own {
+  template <class... Arguments>
+  explicit Own(GraspSystem& shared, Arguments... arguments) : system(shared), measure(*system, arguments...) {}
+  Lease<GraspSystem> system;
+  Measure measure;
+};
 
 /// closure.`measure`(x) for each row of X.
 py::array_t<double> evaluate_closure(GraspSystem& system, const DoubleArray& X, double friction, double torsional,
                                      double (ForceClosure::*measure)(const double*)) {
   const double* x = X.data();
   const int size = system.configuration_size();
-  return evaluate_rows(checked_rows(system, X), [&system, x, size, friction, torsional, measure](int worker) {
-    auto own = system_of(system, worker);
-    auto closure = std::make_shared<ForceClosure>(*own, friction, torsional);
-    return [own, closure, x, size, measure](std::int64_t row) { return (*closure.*measure)(x + row * size); };
+  return evaluate_rows(checked_rows(system, X), [&system, x, size, friction, torsional, measure](int) {
+    auto own = std::make_shared<Own<ForceClosure>>(system, friction, torsional);
+    return [own, x, size, measure](std::int64_t row) { return (own->measure.*measure)(x + row * size); };
   });
 }
 
@@ -164,12 +167,10 @@ void bind_quality(py::module_& module) {
         const double* x = X.data();
         double* axes = out.mutable_data();
         const int size = system.configuration_size();
-        for_rows(n, [&system, x, axes, dof, size, length_unit](int worker) {
-          auto own = system_of(system, worker);
-          auto manipulability = std::make_shared<Manipulability>(*own, length_unit);
-          return [own, manipulability, x, axes, dof, size](std::int64_t row) {
-            manipulability->semi_axes(x + row * size, axes + row * dof);
-          };
+        for_rows(n, [&system, x, axes, dof, size, length_unit](int) {
+          auto own = std::make_shared<Own<Manipulability>>(system, length_unit);
+          return
+              [own, x, axes, dof, size](std::int64_t row) { own->measure.semi_axes(x + row * size, axes + row * dof); };
         });
         return out;
       },

@@ -49,6 +49,7 @@ class AnySystem:
     """
     Equations R(x) = 0 on a configuration space.
     """
+    def __repr__(self) -> str: ...
     def difference(
         self,
         x0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -122,12 +123,14 @@ class PythonSystem(AnySystem):
         lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     ) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 class Sphere(AnySystem):
     """
     The unit sphere in R^n.
     """
     def __init__(self, n: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 class Torus(AnySystem):
     """
@@ -138,18 +141,21 @@ class Torus(AnySystem):
         major_radius: typing.SupportsFloat | typing.SupportsIndex,
         minor_radius: typing.SupportsFloat | typing.SupportsIndex,
     ) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 class Angles(AnySystem):
     """
     n angles, no equation.
     """
     def __init__(self, n: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 class Rotations(AnySystem):
     """
     All rotations, no equation.
     """
     def __init__(self) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 class Polytope:
     """
@@ -300,6 +306,7 @@ class Model:
     Hand and object as one kinematic tree.
     """
     def __init__(self, urdf: str, object_joint: str) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
     def frame_placements(
         self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
     ) -> dict[str, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]]:
@@ -373,6 +380,7 @@ class PlanePatch(Patch):
     The x-z plane of a placement, normal y.
     """
     def __init__(self, T: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 class RevolutionPatch(Patch):
     """
@@ -384,6 +392,7 @@ class RevolutionPatch(Patch):
         breaks: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
         coefficients: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 4]"],
     ) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 class TorusPatch(Patch):
     """
@@ -395,6 +404,7 @@ class TorusPatch(Patch):
         ring_radius: typing.SupportsFloat | typing.SupportsIndex,
         tube_radius: typing.SupportsFloat | typing.SupportsIndex,
     ) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 class EllipsoidPatch(Patch):
     """
@@ -405,6 +415,7 @@ class EllipsoidPatch(Patch):
         T: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
         semi_axes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
     ) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 class BSplinePatch(Patch):
     """
@@ -418,12 +429,14 @@ class BSplinePatch(Patch):
         control_points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
         unit: str,
     ) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 class FlippedPatch(Patch):
     """
     A patch with the opposite normal.
     """
     def __init__(self, patch: Patch) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 class CurvePatch(Patch):
     """
@@ -436,6 +449,7 @@ class CurvePatch(Patch):
         u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 4]"],
         v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 4]"],
     ) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 class PatchParameter:
     """
@@ -449,6 +463,7 @@ class PatchParameter:
         lower: typing.SupportsFloat | typing.SupportsIndex,
         upper: typing.SupportsFloat | typing.SupportsIndex,
     ) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 class ContactSide:
     """
@@ -462,6 +477,7 @@ class ContactSide:
         u: PatchParameter,
         v: PatchParameter,
     ) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 class GraspSystem(AnySystem):
     """
@@ -477,6 +493,7 @@ class GraspSystem(AnySystem):
         upper: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
         drives: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] | None = None,
     ) -> None: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
     def grasp_arrays(
         self, X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
     ) -> dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]]:

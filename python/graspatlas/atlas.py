@@ -15,6 +15,7 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
+from graspatlas.pickling import Light
 from graspatlas.projection import checked_point
 from graspatlas.systems import AnySystem
 from graspatlas.tables import number_array
@@ -96,7 +97,7 @@ class Audit:
 
 
 @dataclass(frozen=True, eq=False)
-class Atlas:
+class Atlas(Light):
     """Charts that cover the part of a manifold connected to a first point.
 
     Chart i covers the points above the polytope ``{u : facet_normals u <= facet_offsets}`` of its tangent space; facets
@@ -134,6 +135,10 @@ class Atlas:
     vertices: Array
     vertex_closed: NDArray[np.uint8]
     neighbour_pairs: NDArray[np.int32]
+
+    def __repr__(self) -> str:
+        sizes = f"k = {self.dimension}, r = {self.radius:g}, epsilon = {self.epsilon:g}"
+        return f"<Atlas of {self.n_charts} charts, {sizes}: {self.status}>"
 
     def check_arrays(self) -> None:
         """Make sure that the arrays fit together, for an atlas that was read from a file.

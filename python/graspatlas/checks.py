@@ -68,6 +68,10 @@ class CheckReport:
 
     checks: tuple[Check, ...]
 
+    def __repr__(self) -> str:
+        failed = sum(not check.passed for check in self.checks)
+        return f"<CheckReport: {len(self.checks)} checks, {failed} failed>"
+
     @property
     def passed(self) -> bool:
         """True when every check passed."""

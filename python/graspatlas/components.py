@@ -77,6 +77,10 @@ class Components:
     status: SearchStatus
     seconds: float
 
+    def __repr__(self) -> str:
+        parts = ", ".join(f"{result.problem.name!r}, {result.atlas.n_charts} charts" for result in self.results[:1])
+        return f"<Components: {len(self)}, the first of {parts or 'nothing'}; {self.status}>"
+
     def __len__(self) -> int:
         return len(self.results)
 

@@ -46,6 +46,9 @@ class Contact:
                 if not np.isfinite(number(value, f"frozen parameter '{name}'")):
                     raise GraspAtlasError(f"parameter '{name}' is frozen at {value}; it must be finite")
 
+    def __repr__(self) -> str:
+        return f"<Contact of {self.frame!r}: {self.hand.kind} on {self.object.kind}>"
+
     def free(self) -> list[tuple[Patch, str]]:
         """Patches and names of the free parameters, in the order in which they stand in x."""
         sides = ((self.hand, self.hand_frozen), (self.object, self.frozen))

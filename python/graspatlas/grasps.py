@@ -7,7 +7,7 @@ link of the hand's URDF, the object that of its own.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from graspatlas import _core
+from graspatlas.pickling import Light
 from graspatlas.tables import number_array
 
 if TYPE_CHECKING:
@@ -57,9 +58,14 @@ class Grasp:
     J: Array
     G: Array
     semi_axes: Array
-    problem: Problem = field(repr=False)
+    problem: Problem
     quality: float = float("nan")
     chart: int = -1
+
+    def __repr__(self) -> str:
+        chart = f", chart {self.chart}" if self.chart >= 0 else ""
+        quality = "" if np.isnan(self.quality) else f", quality {self.quality:.6g}"
+        return f"<Grasp of {self.problem.name!r}{chart}{quality}>"
 
     @property
     def object_xyz(self) -> Array:
@@ -133,7 +139,7 @@ class Grasp:
         return f"quality {self.quality:.6g} at chart {self.chart}: object at ({xyz}) m; {angles}"
 
 
-class Grasps:
+class Grasps(Light):
     """A batch of n grasps of one problem; everything is computed once, in the compiled core, when first asked for.
 
     Its attributes are those of :class:`Grasp` with a leading axis of length n.
@@ -151,6 +157,9 @@ class Grasps:
         self.problem = problem
         self.system = system if system is not None else problem.full_system
         self.x = np.ascontiguousarray(np.atleast_2d(number_array(X, "X")))
+
+    def __repr__(self) -> str:
+        return f"<Grasps: {len(self)} of {self.problem.name!r}>"
 
     def __len__(self) -> int:
         return len(self.x)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.mimics import Mechanism
+from graspatlas.pickling import Light
 from graspatlas.robot_files import find_file, package_folders, robots_folder
 from graspatlas.tables import checked_table, numbers
 from graspatlas.urdf import joint_limits, joints_of_kind, lock_joints, mimics, moving_joints, with_followers_limited
@@ -34,7 +35,7 @@ def _check_xml(name: str, text: str) -> None:
 
 
 @dataclass(frozen=True)
-class Body:
+class Body(Light):
     """A thing described by a URDF.
 
     Attributes:
@@ -55,6 +56,10 @@ class Body:
 
     def __post_init__(self) -> None:
         _check_xml(self.name, self.urdf)
+
+    def __repr__(self) -> str:
+        origin = self.urdf_path or f"a URDF of {len(self.urdf)} characters"
+        return f"<{type(self).__name__} {self.name!r} of {origin}>"
 
     @property
     def tree(self) -> str:
@@ -161,6 +166,7 @@ class Hand(Body):
     """
 
     limits: dict[str, tuple[float, float]] = field(default_factory=dict)
+    __repr__ = Body.__repr__
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -103,6 +103,10 @@ class Climb:
     qualities: Array
     converged: bool
 
+    def __repr__(self) -> str:
+        end = "converged" if self.converged else "given up"
+        return f"<Climb from chart {self.chart}: {self.n_steps} steps to {self.quality:.6g}, {end}>"
+
     @property
     def quality(self) -> float:
         """The index where it ended."""
@@ -309,6 +313,9 @@ class Peak:
     climbs: IntArray
     x: Array
     converged: bool
+
+    def __repr__(self) -> str:
+        return f"<Peak of quality {self.quality:.6g}, where {len(self.climbs)} climbs ended>"
 
 
 def peaks_of(result: Result, climbs: Sequence[Climb]) -> list[Peak]:

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.motions import HandMotions
+from graspatlas.pickling import Light
 
 __all__ = ["Mechanism", "Mimic", "read_mimics"]
 
@@ -112,7 +113,7 @@ def _check_kinds(mimic: Mimic, kind: str, driver: str) -> None:
 
 
 @dataclass(frozen=True)
-class Mechanism:
+class Mechanism(Light):
     """How the joints of a hand depend on those that drive them: q = A q_driven + b.
 
     Attributes:
@@ -122,6 +123,9 @@ class Mechanism:
 
     joints: tuple[str, ...]
     mimics: tuple[Mimic, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<Mechanism of {len(self.joints)} joints, {len(self.mimics)} of which mimic others>"
 
     @cached_property
     def followers(self) -> Mapping[str, Mimic]:

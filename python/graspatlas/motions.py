@@ -69,6 +69,9 @@ class HandMotions:
         object.__setattr__(self, "couplings", couplings if couplings.size else np.zeros((0, h)))
         self._check_couplings()
 
+    def __repr__(self) -> str:
+        return f"<HandMotions of {len(self.joints)} joints, {len(self.couplings)} couplings>"
+
     def _check_couplings(self) -> None:
         c, h = self.couplings.shape if self.couplings.ndim == 2 else (-1, -1)
         if h != len(self.joints) or not np.isfinite(self.couplings).all():

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from graspatlas.atlas import Atlas
 from graspatlas.files import write_csv
 from graspatlas.grasps import Grasps
+from graspatlas.pickling import Light
 from graspatlas.quality import INDICES, evaluate
 from graspatlas.result import Result
 from graspatlas.tables import joined, pose_columns
@@ -35,7 +36,7 @@ Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class Path(Light):
     """A path on a manifold, as points so close together that one may go from each to the next.
 
     Attributes:
@@ -53,6 +54,9 @@ class Path:
     arc_length: Array
     residuals: Array
     tight: bool
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {len(self)} points, length {self.length:.6g}>"
 
     def __len__(self) -> int:
         return len(self.x)
@@ -95,6 +99,7 @@ class GraspPath(Path):
     """
 
     result: Result
+    __repr__ = Path.__repr__
 
     @cached_property
     def grasps(self) -> Grasps:

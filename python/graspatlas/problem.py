@@ -19,6 +19,7 @@ from graspatlas.first_grasp import FirstGrasp, first_grasp_from_array, first_gra
 from graspatlas.hand import Body, Hand
 from graspatlas.motions import HandMotions
 from graspatlas.patches import Patch
+from graspatlas.pickling import Light
 from graspatlas.pose_guess import PoseGuess
 from graspatlas.requirements import Requirement, requirement_from_dict
 from graspatlas.tables import checked_instance, checked_table, number, number_array, shown
@@ -45,7 +46,7 @@ RANK_TRIES = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class Problem(Light):
     """All that defines the set of relevant grasps, and defaults for its atlas.
 
     Joints that mimic others, by the ``<mimic>`` tags of the hand's URDF, follow their drivers on all feasible grasps F:
@@ -107,6 +108,10 @@ class Problem:
         self._check_reference()
         if self.x1 is not None:
             self._check_x1(self.x1)
+
+    def __repr__(self) -> str:
+        things = f"hand {self.hand.name!r}, object {self.object.name!r}, {len(self.contacts)} contacts"
+        return f"<Problem {self.name!r}: {things}>"
 
     def _check_types(self) -> None:
         checked_instance(self.hand, Hand, "hand", "Hand.from_urdf")

@@ -47,6 +47,10 @@ class Refinement:
     all_motions: bool
     complete: bool
 
+    def __repr__(self) -> str:
+        best = f", the highest {self.qualities[0]:.6g}" if len(self.qualities) else ""
+        return f"<Refinement: {self.n_peaks} local maxima{best}>"
+
     @property
     def n_peaks(self) -> int:
         """Number of local maxima."""

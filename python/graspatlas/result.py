@@ -16,6 +16,7 @@ from graspatlas.checks import CheckReport, check_result
 from graspatlas.errors import GraspAtlasError
 from graspatlas.exports import save_grasps
 from graspatlas.grasps import Grasp, Grasps
+from graspatlas.pickling import Light
 from graspatlas.problem import Problem
 from graspatlas.quality import Quality, evaluate, quality_name
 from graspatlas.refinement import Refinement
@@ -31,7 +32,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class Result(Light):
     """The best grasp, and everything it was chosen from.
 
     Attributes:
@@ -57,6 +58,11 @@ class Result:
     refused: Mapping[str, int]
     others: Mapping[str, Array] = field(default_factory=dict)
     refinement: Refinement | None = None
+
+    def __repr__(self) -> str:
+        atlas = f"{self.atlas.n_charts} charts, k = {self.dimension}, {self.status}"
+        best = f"{self.qualities[self.feasible].max():.6g}" if self.feasible.any() else "none, no grasp will do"
+        return f"<Result of {self.problem.name!r}: {atlas}; best {quality_name(self.quality)} {best}>"
 
     @property
     def status(self) -> Status:

@@ -33,6 +33,7 @@ from graspatlas import _core
 from graspatlas.atlas import Atlas, shortest_way
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasp, Grasps
+from graspatlas.pickling import Light
 from graspatlas.quality import evaluate
 from graspatlas.requirements import screen
 
@@ -60,7 +61,7 @@ QUIET_SECONDS = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class Grid(Light):
     """Points of a manifold above the polytopes of an atlas.
 
     Attributes:
@@ -79,6 +80,9 @@ class Grid:
     not_converged: int
     outside: int
     complete: bool
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {len(self)} points{'' if self.complete else ', incomplete'}>"
 
     def __len__(self) -> int:
         return len(self.x)
@@ -99,6 +103,7 @@ class Samples(Grid):
     qualities: Array
     feasible: NDArray[np.bool_]
     refused: dict[str, int]
+    __repr__ = Grid.__repr__
 
     @cached_property
     def best(self) -> Grasp:

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "graspatlas/continuation/atlas.hpp"
+#include "graspatlas/continuation/lease.hpp"
 #include "graspatlas/grasp/grasp_system.hpp"
 #include "graspatlas/quality/force_closure.hpp"
 #include "graspatlas/quality/manipulability.hpp"
@@ -210,6 +211,53 @@ void arbitrary_grasps() {
   }
 }
 
+// What a user reads off one system that others use too.
+std::vector<double> read_grasps(GraspSystem& shared, const std::vector<double>& x1) {
+  const Lease own(shared);
+  Manipulability manipulability(*own, 1e-3);
+  ForceClosure closure(*own, 0.5, 0.005);
+  std::vector<double> out, x(x1.size()), v(shared.tangent_size()), R(shared.equation_count()), J(R.size() * v.size()),
+      axes(shared.object_dof());
+  Random random(23);
+  for (int i = 0; i < 20; ++i) {
+    for (double& c : v) c = 0.1 * random.normal();
+    shared.integrate(x1.data(), v.data(), x.data());
+    shared.difference(x1.data(), x.data(), v.data());
+    own->linearize(x.data(), R.data(), J.data());
+    manipulability.semi_axes(x.data(), axes.data());
+    for (const auto* numbers : {&x, &v, &R, &J, &axes}) out.insert(out.end(), numbers->begin(), numbers->end());
+    out.push_back(closure.margin(x.data()));
+  }
+  return out;
+}
+
+std::vector<double> grow(GraspSystem& system, const std::vector<double>& x1, int threads) {
+  AtlasOptions options;
+  options.radius = 0.3;
+  options.epsilon = 0.5;
+  Atlas atlas(system, x1.data(), options, threads);
+  atlas.expand(60, 1e9);
+  std::vector<double> out;
+  for (std::int64_t i = 0; i < atlas.count(); ++i)
+    out.insert(out.end(), atlas.center(i), atlas.center(i) + system.configuration_size());
+  return out;
+}
+
+// Several users of one system, and some who read URDFs that are wrong.
+void many_users() {
+  const Tripod made = tripod(4, 0.01);
+  const std::vector<double> grasps = read_grasps(*made.system, made.x1), atlas = grow(*made.system, made.x1, 1);
+  together(6, [&](int user) {
+    if (user % 3 == 0) {
+      require(read_grasps(*made.system, made.x1) == grasps, "grasps are those that one user reads, to the bit");
+    } else if (user % 3 == 1) {
+      require(grow(*made.system, made.x1, user) == atlas, "atlases are those of one user, to the bit");
+    } else {
+      for (int i = 0; i < 20; ++i) refuse([] { Model("<robot", ObjectJoint::none); }, "URDF");
+    }
+  });
+}
+
 }  // namespace
 
 void grasps() {
@@ -219,6 +267,7 @@ void grasps() {
   trace(4, 0.3, 100);
   trace(9, 0.5, 30);
   arbitrary_grasps();
+  many_users();
 }
 
 }  // namespace strain

@@ -1,4 +1,5 @@
 #include <limits>
+#include <memory>
 
 #include "graspatlas/continuation/atlas.hpp"
 #include "graspatlas/continuation/toy_systems.hpp"
@@ -44,6 +45,7 @@ class Throwing : public graspatlas::Sphere {
     if (--left_ < 0) throw std::length_error("from the system");
     Sphere::residual(x, R);
   }
+  std::unique_ptr<System> clone() const override { return std::make_unique<Throwing>(*this); }
 
  private:
   int left_;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "graspatlas/continuation/system.hpp"
+#include "graspatlas/parallel.hpp"
 
 /// What the parts of the sanitizer program share. A sanitizer ends the program at the first fault; a wrong answer ends
 /// it through `require`.
@@ -27,6 +28,12 @@ void refuse(Work work, const std::string& part) {
     return;
   }
   require(false, "an error that says '" + part + "' is thrown");
+}
+
+/// Runs work(user) in so many threads at the same time, as a program that uses the library from several threads does.
+template <class Work>
+void together(int users, Work work) {
+  graspatlas::run_on_threads(users, work);
 }
 
 /// Random numbers, the same in every run.
@@ -60,5 +67,6 @@ void grasps();
 void misuse();
 void neighbours();
 void polytopes();
+void users();
 
 }  // namespace strain

@@ -41,9 +41,9 @@ Atlas::Atlas(System& system, const AtlasOptions& options, int threads)
   check_options(options, system);
   for (int i = 0; i < std::max(threads, 1); ++i) {
     auto worker = std::make_unique<Worker>();
-    if (i > 0) worker->system = system.clone();
+    worker->system = system.clone();
     if (i > 0 && !worker->system) break;
-    worker->expander = std::make_unique<Expander>(i > 0 ? *worker->system : system, options, charts_);
+    worker->expander = std::make_unique<Expander>(worker->system ? *worker->system : system, options, charts_);
     workers_.push_back(std::move(worker));
   }
 }

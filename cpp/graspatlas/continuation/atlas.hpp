@@ -81,7 +81,7 @@ class Atlas {
   static constexpr int kWindow = 32;
 
   struct Worker {
-    std::unique_ptr<System> system;  // its own, but for the first worker
+    std::unique_ptr<System> system;  // its own, if the system has a clone
     std::unique_ptr<Expander> expander;
     std::unique_ptr<Auditor> auditor;
   };

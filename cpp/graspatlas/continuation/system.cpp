@@ -17,6 +17,19 @@ System::System(int configuration_size, int tangent_size, int equation_count, int
                 std::to_string(tangent_size) + " variables and " + std::to_string(equation_count) + " equations");
 }
 
+std::unique_ptr<System> System::Spares::take() {
+  const std::lock_guard lock(mutex_);
+  if (clones_.empty()) return nullptr;
+  auto clone = std::move(clones_.back());
+  clones_.pop_back();
+  return clone;
+}
+
+void System::Spares::put(std::unique_ptr<System> clone) {
+  const std::lock_guard lock(mutex_);
+  clones_.push_back(std::move(clone));
+}
+
 void System::integrate(const double* x, const double* v, double* out) const {
   for (int i = 0; i < tangent_size_; ++i) out[i] = x[i] + v[i];
 }

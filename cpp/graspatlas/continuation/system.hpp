@@ -2,8 +2,10 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <mutex>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace graspatlas {
 
@@ -32,6 +34,9 @@ using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::R
 ///
 /// In R^n these are plain addition and subtraction, the default. Every array below belongs to the caller and
 /// has the size named; a matrix is row-major.
+///
+/// What is const may be called by any number of threads at the same time. What is not may write to scratch of the
+/// system: a thread that shares a system with others calls it through a Lease.
 class System {
  public:
   /// Sizes: numbers in a point, in a tangent vector, in R(x), and in the embedding of a point.
@@ -75,7 +80,8 @@ class System {
   /// Charts must be smaller: with angles among the coordinates, displacements of more than half a turn are ambiguous.
   virtual double radius_limit() const;
 
-  /// A copy that another thread may use at the same time; null where there can be none, as for equations in Python.
+  /// A copy, of the same class, that another thread may use at the same time; null where there can be none, as for
+  /// equations in Python. Then any thread may call the system itself at any time.
   virtual std::unique_ptr<System> clone() const { return nullptr; }
 
  protected:
@@ -83,8 +89,26 @@ class System {
   void set_bound_normals(const RowMatrix& B) { bound_normals_ = B; }
 
  private:
+  template <class S>
+  friend class Lease;
+
+  /// Clones that no lease holds. A copy of a system begins with none.
+  class Spares {
+   public:
+    Spares() = default;
+    Spares(const Spares&) {}
+    /// A clone; null when there is none.
+    std::unique_ptr<System> take();
+    void put(std::unique_ptr<System> clone);
+
+   private:
+    std::mutex mutex_;
+    std::vector<std::unique_ptr<System>> clones_;
+  };
+
   int configuration_size_, tangent_size_, equation_count_, embedding_size_;
   RowMatrix bound_normals_;
+  Spares spares_;
 };
 
 }  // namespace graspatlas

@@ -19,6 +19,8 @@ class Sphere : public System {
 class Torus : public System {
  public:
   Torus(double major_radius, double minor_radius);
+  double major_radius() const { return major_; }
+  double minor_radius() const { return minor_; }
   void residual(const double* x, double* R) override;
   void linearize(const double* x, double* R, double* J) override;
   std::unique_ptr<System> clone() const override { return std::make_unique<Torus>(*this); }

@@ -20,6 +20,7 @@ class BSplineBasis {
   /// `knots` do not descend; an inner knot comes at most p - 1 times, so that the surface's normal is continuous.
   BSplineBasis(int degree, std::vector<double> knots);
   int degree() const { return degree_; }
+  const std::vector<double>& knots() const { return knots_; }
   int count() const { return static_cast<int>(knots_.size()) - degree_ - 1; }
   /// Beyond the ends of the domain [knots[p], knots[count]] the polynomials of the end pieces go on.
   void evaluate(double t, Values& out) const;
@@ -38,6 +39,9 @@ class BSplinePatch : public Patch {
   /// `control_points` [u.count() v.count() x 3], the index of v running fastest.
   BSplinePatch(BSplineBasis u, BSplineBasis v, const Eigen::Matrix<double, Eigen::Dynamic, 3>& control_points,
                ParameterUnit unit);
+  const BSplineBasis& u() const { return u_; }
+  const BSplineBasis& v() const { return v_; }
+  const Eigen::Matrix<double, 3, Eigen::Dynamic>& control_points() const { return control_points_; }
   void evaluate(double u, double v, PatchPoint& out) const override;
   ParameterUnit u_unit() const override { return unit_; }
   ParameterUnit v_unit() const override { return unit_; }

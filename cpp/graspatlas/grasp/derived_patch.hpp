@@ -10,6 +10,7 @@ namespace graspatlas {
 class FlippedPatch : public Patch {
  public:
   explicit FlippedPatch(std::shared_ptr<const Patch> patch);
+  const std::shared_ptr<const Patch>& patch() const { return patch_; }
   void evaluate(double u, double v, PatchPoint& out) const override;
   ParameterUnit u_unit() const override { return patch_->u_unit(); }
   ParameterUnit v_unit() const override { return patch_->v_unit(); }
@@ -23,6 +24,9 @@ class FlippedPatch : public Patch {
 class CurvePatch : public Patch {
  public:
   CurvePatch(std::shared_ptr<const Patch> patch, PiecewiseCubic u, PiecewiseCubic v);
+  const std::shared_ptr<const Patch>& patch() const { return patch_; }
+  const PiecewiseCubic& u() const { return u_; }
+  const PiecewiseCubic& v() const { return v_; }
   void evaluate(double s, double unused, PatchPoint& out) const override;
   ParameterUnit u_unit() const override { return ParameterUnit::length; }
   ParameterUnit v_unit() const override { return ParameterUnit::length; }

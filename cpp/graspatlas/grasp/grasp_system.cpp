@@ -43,6 +43,20 @@ double parameter_scale(ParameterUnit unit, double length_scale) {
   return unit == ParameterUnit::length ? length_scale : 1.0;
 }
 
+// Room for a tangent vector of a model, on the stack unless the model is large.
+class Velocity {
+ public:
+  explicit Velocity(int size) {
+    if (size > kMost) many_.resize(static_cast<std::size_t>(size));
+  }
+  double* data() { return many_.empty() ? few_ : many_.data(); }
+
+ private:
+  static constexpr int kMost = 64;
+  double few_[kMost];
+  std::vector<double> many_;
+};
+
 template <class Visit>
 void visit_sides(const std::vector<Contact>& contacts, Visit visit) {
   for (const Contact& contact : contacts) {
@@ -91,7 +105,8 @@ GraspSystem::GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> cont
       rows_per_contact_(equations_per_contact(*model_)),
       rows_(is_planar(*model_) ? kPlanarRows : kSpatialRows),
       length_scale_(length_scale),
-      velocity_(model_->v_size()) {
+      lower_limits_(lower),
+      upper_limits_(upper) {
   if (motions.rows() != model_->hand_v_size())
     throw Error("the hand motions have " + std::to_string(motions.rows()) + " rows, the hand has " +
                 std::to_string(model_->hand_v_size()) + " joint velocities");
@@ -271,18 +286,20 @@ void GraspSystem::linearize(const double* x, double* R, double* J) {
 
 void GraspSystem::integrate(const double* x, const double* v, double* out) const {
   const int hand_v_size = model_->hand_v_size();
+  Velocity room(model_->v_size());
+  double* const velocity = room.data();
   for (int i = 0; i < hand_v_size; ++i) {
     double sum = 0.0;
     if (all_motions_)
       sum = v[i];
     else
       for (int c = 0; c < motion_count_; ++c) sum += motions_(i, c) * v[c];
-    velocity_[i] = sum;
+    velocity[i] = sum;
   }
   const int lengths = object_lengths(*model_);
   for (int i = 0; i < object_v_size_; ++i)
-    velocity_[hand_v_size + i] = v[motion_count_ + i] * (i < lengths ? length_scale_ : 1.0);
-  model_->integrate(x, velocity_.data(), out);
+    velocity[hand_v_size + i] = v[motion_count_ + i] * (i < lengths ? length_scale_ : 1.0);
+  model_->integrate(x, velocity, out);
   const double* v_w = v + motion_count_ + object_v_size_;
   for (int i = 0; i < parameter_count(); ++i) {
     const int at = model_->q_size() + i;
@@ -292,18 +309,20 @@ void GraspSystem::integrate(const double* x, const double* v, double* out) const
 }
 
 void GraspSystem::difference(const double* x0, const double* x1, double* out) const {
-  model_->difference(x0, x1, velocity_.data());
+  Velocity room(model_->v_size());
+  double* const velocity = room.data();
+  model_->difference(x0, x1, velocity);
   const int hand_v_size = model_->hand_v_size();
   if (all_motions_) {
-    std::copy_n(velocity_.data(), hand_v_size, out);
+    std::copy_n(velocity, hand_v_size, out);
   } else {
     std::fill_n(out, motion_count_, 0.0);
     for (int i = 0; i < hand_v_size; ++i)
-      for (int c = 0; c < motion_count_; ++c) out[c] += coordinates_(i, c) * velocity_[i];
+      for (int c = 0; c < motion_count_; ++c) out[c] += coordinates_(i, c) * velocity[i];
   }
   const int lengths = object_lengths(*model_);
   for (int i = 0; i < object_v_size_; ++i)
-    out[motion_count_ + i] = velocity_[hand_v_size + i] / (i < lengths ? length_scale_ : 1.0);
+    out[motion_count_ + i] = velocity[hand_v_size + i] / (i < lengths ? length_scale_ : 1.0);
   double* out_w = out + motion_count_ + object_v_size_;
   for (int i = 0; i < parameter_count(); ++i) {
     const int at = model_->q_size() + i;

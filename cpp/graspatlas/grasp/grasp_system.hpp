@@ -50,7 +50,7 @@ class GraspSystem : public System {
   /// the metric of the tangent space: orthonormal for revolute joints; the identity keeps them all. Limits
   /// [hand_q_size] apply to joints with one number each; infinite ones are none. Columns of `drives`
   /// [hand_v_size x d] are the joint velocities that the unit velocity of each driven joint makes: the identity unless
-  /// joints mimic others.
+  /// joints mimic others. The model is used by this system only.
   GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> contacts, const Matrix& motions, double length_scale,
               const std::vector<double>& lower, const std::vector<double>& upper, const Matrix& drives);
 
@@ -69,6 +69,11 @@ class GraspSystem : public System {
   int contact_count() const { return static_cast<int>(contacts_.size()); }
   int parameter_count() const { return static_cast<int>(parameters_.size()); }
   double length_scale() const { return length_scale_; }
+  const std::vector<Contact>& contacts() const { return contacts_; }
+  const RowMatrix& motions() const { return motions_; }
+  const RowMatrix& drives() const { return drives_; }
+  const std::vector<double>& lower_limits() const { return lower_limits_; }
+  const std::vector<double>& upper_limits() const { return upper_limits_; }
   /// Name of each bound, in the order of `slack`.
   const std::vector<std::string>& bound_names() const { return bound_names_; }
 
@@ -117,10 +122,10 @@ class GraspSystem : public System {
   int motion_count_, object_v_size_, rows_per_contact_;
   const int* rows_;  // of the entries of a contact, those that are equations
   double length_scale_;
+  std::vector<double> lower_limits_, upper_limits_;
   std::vector<FreeParameter> parameters_;
   std::vector<Bound> bounds_;
   std::vector<std::string> bound_names_;
-  mutable std::vector<double> velocity_;  // full tangent vector of the model
 };
 
 }  // namespace graspatlas

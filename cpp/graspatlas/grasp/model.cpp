@@ -2,6 +2,7 @@
 
 #include <console_bridge/console.h>
 
+#include <mutex>
 #include <pinocchio/algorithm/jacobian.hpp>
 #include <pinocchio/algorithm/joint-configuration.hpp>
 #include <pinocchio/algorithm/kinematics.hpp>
@@ -23,10 +24,11 @@ using ConstNumbers = Eigen::Map<const Eigen::Matrix<double, n, 1>>;
 
 std::vector<double> to_std(const Eigen::VectorXd& v) { return {v.data(), v.data() + v.size()}; }
 
-/// Collects what the URDF parser would print, for the message of our error.
+/// Collects what the URDF parser would print, for the message of our error. There is one at a time: the parser has one
+/// place for it in the whole process.
 class ParserMessages : public console_bridge::OutputHandler {
  public:
-  ParserMessages() { console_bridge::useOutputHandler(this); }
+  ParserMessages() : alone_(parsing()) { console_bridge::useOutputHandler(this); }
   ~ParserMessages() override { console_bridge::restorePreviousOutputHandler(); }
   void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
     if (level < console_bridge::CONSOLE_BRIDGE_LOG_ERROR) return;
@@ -36,6 +38,12 @@ class ParserMessages : public console_bridge::OutputHandler {
   const std::string& text() const { return text_; }
 
  private:
+  static std::mutex& parsing() {
+    static std::mutex mutex;
+    return mutex;
+  }
+
+  const std::lock_guard<std::mutex> alone_;
   std::string text_;
 };
 
@@ -69,7 +77,8 @@ struct Model::Pinocchio {
   pinocchio::Data data;
 };
 
-Model::Model(const std::string& urdf, ObjectJoint object) : pinocchio_(new Pinocchio), object_kind_(object) {
+Model::Model(const std::string& urdf, ObjectJoint object)
+    : pinocchio_(new Pinocchio), urdf_(std::make_shared<std::string>(urdf)), object_kind_(object) {
   pinocchio::Model& model = pinocchio_->model;
   model = build_model(urdf);
   check_axes(model);
@@ -102,6 +111,7 @@ Model::Model(const std::string& urdf, ObjectJoint object) : pinocchio_(new Pinoc
 
 Model::Model(const Model& other)
     : pinocchio_(new Pinocchio(*other.pinocchio_)),
+      urdf_(other.urdf_),
       hand_q_size_(other.hand_q_size_),
       hand_v_size_(other.hand_v_size_),
       object_joint_(other.object_joint_),

@@ -41,6 +41,7 @@ class Model {
   int hand_v_size() const { return hand_v_size_; }
   int object_joint() const { return object_joint_; }  ///< -1 without an object
   ObjectJoint object_kind() const { return object_kind_; }
+  const std::string& urdf() const { return *urdf_; }
   const std::vector<JointInfo>& hand_joints() const { return hand_joints_; }
   const std::vector<FrameInfo>& hand_frames() const { return hand_frames_; }
   std::vector<double> lower_limits() const;  ///< of the hand [hand_q_size]
@@ -65,6 +66,7 @@ class Model {
  private:
   struct Pinocchio;
   std::unique_ptr<Pinocchio> pinocchio_;
+  std::shared_ptr<const std::string> urdf_;
   int hand_q_size_, hand_v_size_, object_joint_ = -1;
   ObjectJoint object_kind_;
   bool hand_is_euclidean_ = true;

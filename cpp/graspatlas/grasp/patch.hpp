@@ -41,6 +41,7 @@ class Patch {
 class PlanePatch : public Patch {
  public:
   explicit PlanePatch(const Placement& placement);
+  const Placement& placement() const { return placement_; }
   void evaluate(double u, double v, PatchPoint& out) const override;
   ParameterUnit u_unit() const override { return ParameterUnit::length; }
   ParameterUnit v_unit() const override { return ParameterUnit::length; }
@@ -59,6 +60,8 @@ class RevolutionPatch : public Patch {
   /// `breaks` ascend, one more than there are rows of `coefficients` [pieces x 4].
   RevolutionPatch(const Placement& placement, std::vector<double> breaks,
                   const Eigen::Matrix<double, Eigen::Dynamic, 4>& coefficients);
+  const Placement& placement() const { return placement_; }
+  const PiecewiseCubic& outline() const { return outline_; }
   void evaluate(double u, double v, PatchPoint& out) const override;
   ParameterUnit u_unit() const override { return ParameterUnit::angle; }
   ParameterUnit v_unit() const override { return ParameterUnit::length; }

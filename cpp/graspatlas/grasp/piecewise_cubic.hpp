@@ -19,6 +19,8 @@ class PiecewiseCubic {
   PiecewiseCubic(std::vector<double> breaks, const Eigen::Matrix<double, Eigen::Dynamic, 4>& coefficients,
                  const std::string& what);
   Value evaluate(double t) const;
+  const std::vector<double>& breaks() const { return breaks_; }
+  const Eigen::Matrix<double, Eigen::Dynamic, 4>& coefficients() const { return coefficients_; }
 
  private:
   std::vector<double> breaks_;

@@ -10,6 +10,9 @@ namespace graspatlas {
 class TorusPatch : public Patch {
  public:
   TorusPatch(const Placement& placement, double ring_radius, double tube_radius);
+  const Placement& placement() const { return placement_; }
+  double ring_radius() const { return ring_radius_; }
+  double tube_radius() const { return tube_radius_; }
   void evaluate(double u, double v, PatchPoint& out) const override;
   ParameterUnit u_unit() const override { return ParameterUnit::angle; }
   ParameterUnit v_unit() const override { return ParameterUnit::angle; }
@@ -24,6 +27,8 @@ class TorusPatch : public Patch {
 class EllipsoidPatch : public Patch {
  public:
   EllipsoidPatch(const Placement& placement, const Eigen::Vector3d& semi_axes);
+  const Placement& placement() const { return placement_; }
+  const Eigen::Vector3d& semi_axes() const { return semi_axes_; }
   void evaluate(double u, double v, PatchPoint& out) const override;
   ParameterUnit u_unit() const override { return ParameterUnit::angle; }
   ParameterUnit v_unit() const override { return ParameterUnit::angle; }

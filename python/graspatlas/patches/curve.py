@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -39,7 +39,7 @@ class Curve(Patch):
     """
 
     patch: Patch
-    points: tuple[tuple[float, float], ...]
+    points: tuple[tuple[float, float], ...] = field(repr=False)
     kind: ClassVar[str] = "curve"
     parameters: ClassVar[tuple[str, ...]] = ("u",)
 

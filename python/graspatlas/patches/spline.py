@@ -150,8 +150,8 @@ class BSpline(_TensorProduct):
     """
 
     degrees: tuple[int, int] = (3, 3)
-    u_knots: tuple[float, ...] | None = None
-    v_knots: tuple[float, ...] | None = None
+    u_knots: tuple[float, ...] | None = field(default=None, repr=False)
+    v_knots: tuple[float, ...] | None = field(default=None, repr=False)
     unit: str = "number"
     kind: ClassVar[str] = "bspline"
 

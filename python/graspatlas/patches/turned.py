@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -151,8 +151,8 @@ class Revolution(TurnedPatch):
         origin, axis, u_axis, u_interval, v_interval, flipped: As for :class:`Cylinder`.
     """
 
-    heights: tuple[float, ...] = ()
-    radii: tuple[float, ...] = ()
+    heights: tuple[float, ...] = field(default=(), repr=False)
+    radii: tuple[float, ...] = field(default=(), repr=False)
     kind: ClassVar[str] = "revolution"
 
     def __post_init__(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -67,10 +68,14 @@ class Picture(Figure):
             super().savefig(fname, **options)
 
 
+#: Matplotlib has one style in the whole process: one thread draws at a time.
+_DRAWING = threading.RLock()
+
+
 @contextmanager
 def styled() -> Iterator[None]:
     """Draw in this style, whatever the user has set."""
-    with mpl.rc_context():
+    with _DRAWING, mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)  # type: ignore[arg-type, unused-ignore]
         yield
