@@ -124,7 +124,7 @@ class Atlas:
             whole = name in ("facet_start", "facet_tags", "vertex_start", "vertex_closed", "neighbour_pairs")
             if array.shape != shape or array.dtype.kind not in ("iu" if whole else "f"):
                 raise GraspAtlasError(f"array '{name}' has shape {array.shape} and type {array.dtype}, not {shape}")
-            if not whole and not (np.abs(array) < LARGEST).all():
+            if not whole and not (np.abs(array.astype(float)) < LARGEST).all():
                 raise GraspAtlasError(f"array '{name}' holds a number that is not finite, or not below {LARGEST:g}")
         ends_fit = all(
             start[0] == 0 and start[-1] == end and (np.diff(start) > k).all()

@@ -28,7 +28,7 @@ from graspatlas.requirements import REQUIREMENTS, parse_requirement
 from graspatlas.result import Result
 from graspatlas.result_commands import add_result_commands
 from graspatlas.start_up import hear_interrupts
-from graspatlas.terminal import finish_output, printable, say, silence_output
+from graspatlas.terminal import finish_output, printable, say, shortened, silence_output
 from graspatlas.words import path_word
 
 __all__ = ["main"]
@@ -79,15 +79,20 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _misuse(reason: object) -> int:
-    say(" ".join(f"graspatlas: error: {reason}".split("\n")), file=sys.stderr)
+    say(shortened(" ".join(f"graspatlas: error: {reason}".split("\n"))), file=sys.stderr)
     return MISUSE
 
 
 class _Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, like all others."""
 
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """Help and version; argparse keeps quiet where they cannot be written."""
+        say(message, file=None if file is sys.stdout else file, end="")
+
     def error(self, message: str) -> NoReturn:
-        self.exit(MISUSE, printable(f"graspatlas: error: {message}; see '{self.prog} --help'") + "\n")
+        line = shortened(printable(f"graspatlas: error: {message}; see '{self.prog} --help'"))
+        self.exit(MISUSE, line + "\n")
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -17,7 +17,17 @@ import numpy as np
 
 from graspatlas.errors import GraspAtlasError
 
-__all__ = ["checked_target", "opened", "read_text", "replaced", "writable_folder", "write_csv"]
+__all__ = [
+    "checked_target",
+    "is_file",
+    "is_folder",
+    "opened",
+    "read_text",
+    "replaced",
+    "stated_path",
+    "writable_folder",
+    "write_csv",
+]
 
 #: Longest text that is read [bytes]: those of problems, URDFs and SRDFs are a thousand times shorter.
 LONGEST_TEXT = 64 * 2**20
@@ -30,6 +40,43 @@ _KINDS = (
 )
 
 
+def stated_path(path: str | os.PathLike[str], verb: str) -> Path:
+    """A path that says something.
+
+    Args:
+        path: What came.
+        verb: What is to be done with it, for the message.
+
+    Raises:
+        GraspAtlasError: If it is empty or no path.
+    """
+    try:
+        text = os.fspath(path)
+    except TypeError:
+        text = None
+    if not isinstance(text, str):
+        raise GraspAtlasError(f"cannot {verb} {path!r:.60}: a path is a text or a pathlib.Path")
+    if not text:
+        raise GraspAtlasError(f"cannot {verb} '': the path is empty; name a place")
+    return Path(text)
+
+
+def is_file(path: str | os.PathLike[str]) -> bool:
+    """Whether a path leads to a file; one that is too long or holds a null does not."""
+    try:
+        return stat.S_ISREG(os.stat(path).st_mode)
+    except (OSError, ValueError):
+        return False
+
+
+def is_folder(path: str | os.PathLike[str]) -> bool:
+    """Whether a path leads to a folder; one that is too long or holds a null does not."""
+    try:
+        return stat.S_ISDIR(os.stat(path).st_mode)
+    except (OSError, ValueError):
+        return False
+
+
 def checked_target(path: str | os.PathLike[str]) -> Path:
     """Where a file that is written to a path will stand: at the end of symbolic links, if it is one.
 
@@ -39,7 +86,7 @@ def checked_target(path: str | os.PathLike[str]) -> Path:
     Raises:
         GraspAtlasError: If it is empty or not the path of a file: a folder, a device, a pipe, a socket.
     """
-    target = _stated(path, "write")
+    target = stated_path(path, "write")
     try:
         kind = _kind(os.stat(target).st_mode)
     except FileNotFoundError:
@@ -96,7 +143,7 @@ def opened(path: str | os.PathLike[str], what: str = "file") -> Iterator[BinaryI
         GraspAtlasError: If it is empty or not the path of a file, such as that of a pipe.
         OSError: If there is none, or it cannot be read.
     """
-    source = _stated(path, "read")
+    source = stated_path(path, "read")
     try:
         kind = _kind(os.stat(source).st_mode)
     except ValueError as error:
@@ -133,7 +180,7 @@ def writable_folder(path: str | os.PathLike[str]) -> Path:
     Raises:
         GraspAtlasError: If they cannot.
     """
-    folder = _stated(path, "write to folder")
+    folder = stated_path(path, "write to folder")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -170,19 +217,6 @@ def _cell(value: Any) -> Any:
     if isinstance(value, bool):
         return "true" if value else "false"
     return "" if value != value else value
-
-
-def _stated(path: str | os.PathLike[str], verb: str) -> Path:
-    """A path that says something."""
-    try:
-        text = os.fspath(path)
-    except TypeError:
-        text = None
-    if not isinstance(text, str):
-        raise GraspAtlasError(f"cannot {verb} {path!r:.60}: a path is a text or a pathlib.Path")
-    if not text:
-        raise GraspAtlasError(f"cannot {verb} '': the path is empty; name a place")
-    return Path(text)
 
 
 def _kind(mode: int) -> str:

@@ -7,30 +7,22 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.files import read_text
 from graspatlas.mimics import Mechanism
 from graspatlas.robot_files import find_file, package_folders, robots_folder
 from graspatlas.tables import checked_table, numbers
 from graspatlas.urdf import joint_limits, joints_of_kind, lock_joints, mimics, moving_joints, with_followers_limited
+from graspatlas.urdf_checks import check_urdf
 
 __all__ = ["Body", "Hand", "robots_folder"]
 
 Array = NDArray[np.float64]
-
-
-def _check_xml(name: str, text: str) -> None:
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise GraspAtlasError(f"the URDF of '{name}' is not XML: {error}") from None
-    if root.tag != "robot":
-        raise GraspAtlasError(f"the URDF of '{name}' must hold a <robot>, not a <{root.tag}>")
 
 
 @dataclass(frozen=True)
@@ -54,7 +46,7 @@ class Body:
     package_paths: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        _check_xml(self.name, self.urdf)
+        check_urdf(self.name, self.urdf)
 
     @property
     def tree(self) -> str:
@@ -73,9 +65,9 @@ class Body:
         stated = tuple(str((folder or Path()) / place) for place in package_paths)
         path = find_file(urdf, folder, stated)
         try:
-            text = path.read_text(encoding="utf-8")
-            srdf_text = find_file(srdf, folder, stated).read_text(encoding="utf-8") if srdf else ""
-        except (OSError, UnicodeDecodeError) as error:
+            text = read_text(path)
+            srdf_text = read_text(find_file(srdf, folder, stated)) if srdf else ""
+        except (OSError, ValueError) as error:
             raise GraspAtlasError(f"cannot read '{urdf}': {error}") from None
         return {
             "name": name or path.stem,

@@ -20,11 +20,15 @@ from graspatlas.quality import quality_name
 from graspatlas.result import Result, load_result
 from graspatlas.sampling import Samples, densify
 from graspatlas.shortest_paths import shortest_path
+from graspatlas.tables import shown
 from graspatlas.terminal import say
 from graspatlas.timing import speed_limits
 from graspatlas.words import path_word
 
 __all__ = ["add_result_commands"]
+
+#: Number of a chart [digits].
+LONGEST_NUMBER = 18
 
 
 def add_result_commands(commands: Any) -> None:
@@ -251,9 +255,9 @@ def _chart(result: Result, name: str) -> int:
         return 0
     if name in ("best", "worst"):
         return int(getattr(result, name).chart)
-    if name.isascii() and name.isdigit():
+    if name.isascii() and name.isdigit() and len(name) <= LONGEST_NUMBER:
         return int(name)
-    raise GraspAtlasError(f"'{name}' names no grasp; give the number of a chart, or first, best or worst")
+    raise GraspAtlasError(f"{shown(name)} names no grasp; give the number of a chart, or first, best or worst")
 
 
 def _check_result(options: argparse.Namespace) -> int:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import unicodedata
 from typing import TextIO
 
 from graspatlas.errors import GraspAtlasError
 
-__all__ = ["finish_output", "printable", "say", "silence_output"]
+__all__ = ["finish_output", "printable", "say", "shortened", "silence_output"]
 
+#: Words that are longer are shortened in messages [characters].
+LONGEST_WORD = 300
 #: Unicode categories of what is no letter, digit or sign: control codes, directions of writing, lone surrogates, lines.
 _CONTROL = ("Cc", "Cf", "Cs", "Zl", "Zp")
 
@@ -28,6 +31,11 @@ def printable(text: object) -> str:
         letter.encode("unicode_escape").decode("ascii") if unicodedata.category(letter) in _CONTROL else letter
         for letter in plain
     )
+
+
+def shortened(text: str) -> str:
+    """A text whose words of hundreds of letters, such as paths that are none, lack their middle."""
+    return re.sub(rf"\S{{{LONGEST_WORD},}}", lambda word: f"{word[0][:80]}...{word[0][-20:]}", text)
 
 
 def say(*lines: object, file: TextIO | None = None, end: str = "\n") -> None:
