@@ -67,7 +67,7 @@ class Body:
         try:
             text = read_text(path)
             srdf_text = read_text(find_file(srdf, folder, stated)) if srdf else ""
-        except (OSError, ValueError) as error:
+        except (OSError, UnicodeDecodeError) as error:
             raise GraspAtlasError(f"cannot read '{urdf}': {error}") from None
         return {
             "name": name or path.stem,

@@ -60,7 +60,7 @@ def _check(body: str, path: Path) -> None:
     if not sound.all():
         first = ", ".join(f"{number:g}" for number in corners[np.flatnonzero(~sound)[0]])
         raise GraspAtlasError(
-            f"mesh '{path}' of '{body}' has {(~sound).sum()} corners that are no places, such as ({first}): save it anew"
+            f"mesh '{path}' of '{body}' has {(~sound).sum()} corners that are no places, as ({first}): save it anew"
         )
     spread = corners - corners.mean(axis=0) if len(corners) else np.zeros((1, 3))
     sizes = np.linalg.svd(spread.T @ spread, compute_uv=False) ** 0.5

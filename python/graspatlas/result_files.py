@@ -97,6 +97,8 @@ def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
         ) from None
     except OSError as error:
         raise GraspAtlasError(f"cannot read result '{source}': {error.strerror or error}") from None
+    except GraspAtlasError:
+        raise
     except (DamagedArchive, KeyError, ValueError, RecursionError) as error:
         reason = f" ({error})" if isinstance(error, DamagedArchive) else ""
         raise GraspAtlasError(f"'{source}' is damaged or not a graspatlas result{reason}; compute it again") from None

@@ -33,7 +33,7 @@ def read_postures(path: Path, name: str | None = None) -> tuple[NDArray[np.float
     label = name or str(path)
     try:
         return _read_npz(path, label) if path.suffix == ".npz" else _read_csv(path, label)
-    except (OSError, ValueError, csv.Error) as error:
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or error
         raise GraspAtlasError(f"cannot read postures '{label}': {reason}") from None
 
@@ -69,6 +69,8 @@ def _read_npz(path: Path, label: str) -> tuple[NDArray[np.float64], tuple[str, .
         with opened(path, "postures") as stream:
             arrays = read_arrays(stream)
         return np.array(arrays["samples"], float), tuple(map(str, arrays["joints"]))
+    except GraspAtlasError:
+        raise
     except (DamagedArchive, KeyError, ValueError, TypeError) as error:
         reason = " ".join(str(error).split())
         raise GraspAtlasError(f"'{label}' needs the arrays samples [z, h] and joints [h]: {reason}") from None

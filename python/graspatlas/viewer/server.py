@@ -25,7 +25,6 @@ from graspatlas.tables import shown
 with warnings.catch_warnings():  # meshcat imports a deprecated part of pyzmq
     warnings.simplefilter("ignore", DeprecationWarning)
     import tornado.httpserver
-    import tornado.netutil
     import tornado.web
     from meshcat.servers.zmqserver import VIEWER_HTML, VIEWER_ROOT, StaticFileHandlerNoCache, WebSocketHandler
     from meshcat.servers.zmqserver import ZMQWebSocketBridge as MeshcatBridge
@@ -54,9 +53,9 @@ class Server:
     """
 
     def __init__(self, host: str = LOOPBACK) -> None:
-        self._sockets = _listening(host)
+        self._socket = _listening(host)
         self.zmq_url = f"inproc://graspatlas-{next(_numbers)}"
-        self.web_url = _page_address(host, self._sockets[0].getsockname()[1])
+        self.web_url = _page_address(host, self._socket.getsockname()[1])
         answer: queue.Queue[_Bridge | Exception] = queue.Queue()
         self._thread = threading.Thread(target=self._run, args=(answer,), name="graspatlas-viewer", daemon=True)
         self._thread.start()
@@ -86,10 +85,9 @@ class Server:
         loop = asyncio.new_event_loop()
         asyncio.set_event_loop(loop)
         try:
-            bridge = _Bridge(self._sockets, self.zmq_url, self.web_url)
+            bridge = _Bridge(self._socket, self.zmq_url, self.web_url)
         except Exception as error:  # reported where the server was asked for
-            for each in self._sockets:
-                each.close()
+            self._socket.close()
             answer.put(error)
         else:
             answer.put(bridge)
@@ -118,13 +116,13 @@ class Window(ViewerWindow):  # type: ignore[misc]
 
 
 class _Bridge(MeshcatBridge):  # type: ignore[misc]
-    """Meshcat's bridge from commands to browsers, on sockets that listen already."""
+    """Meshcat's bridge from commands to browsers, on a socket that listens already."""
 
     context = ViewerWindow.context  # what inproc addresses are looked up in
 
-    def __init__(self, sockets: list[socket.socket], zmq_url: str, web_url: str) -> None:
-        self._sockets, self.awaits_image = sockets, False
-        super().__init__(zmq_url=zmq_url, port=sockets[0].getsockname()[1])
+    def __init__(self, listening: socket.socket, zmq_url: str, web_url: str) -> None:
+        self._listening, self.awaits_image = listening, False
+        super().__init__(zmq_url=zmq_url, port=listening.getsockname()[1])
         self.web_url = web_url
 
     def make_app(self) -> Any:
@@ -132,9 +130,9 @@ class _Bridge(MeshcatBridge):  # type: ignore[misc]
 
         class Application(tornado.web.Application):
             def listen(self, port: int, *_: Any, **__: Any) -> Any:
-                """Take the sockets that there are; tornado would listen on every address."""
+                """Take the socket that there is; tornado would listen on every address."""
                 http = bridge._http = tornado.httpserver.HTTPServer(self)
-                http.add_sockets(bridge._sockets)
+                http.add_socket(bridge._listening)
                 return http
 
         files = {"path": VIEWER_ROOT, "default_filename": VIEWER_HTML}
@@ -173,21 +171,35 @@ class _Socket(WebSocketHandler):  # type: ignore[misc]
         self.bridge.websocket_pool.discard(self)
 
 
-def _listening(host: str) -> list[socket.socket]:
-    """Sockets that listen on an address, and on no other, all on one port."""
+def _listening(host: str) -> socket.socket:
+    """A socket that listens on an address, and on no other."""
     if not isinstance(host, str) or not host or "\0" in host:
         raise GraspAtlasError(f"host must be an address such as '{LOOPBACK}', got {shown(host)}")
     try:
+        family, kind, protocol, _, place = socket.getaddrinfo(host, PORT, type=socket.SOCK_STREAM)[0]
         try:
-            return tornado.netutil.bind_sockets(PORT, address=host)
-        except OSError:
-            return tornado.netutil.bind_sockets(0, address=host)
+            return _bound(socket.socket(family, kind, protocol), place)
+        except OSError:  # somebody listens there
+            return _bound(socket.socket(family, kind, protocol), (place[0], 0, *place[2:]))
     except (OSError, UnicodeError) as error:
         reason = getattr(error, "strerror", None) or error
         raise GraspAtlasError(
             f"the viewer cannot listen on host {shown(host)}: {reason}; give an address of this machine, such as "
             f"'{LOOPBACK}', or write a page that needs no server: graspatlas view --html FILE"
         ) from None
+
+
+def _bound(one: socket.socket, place: tuple[Any, ...]) -> socket.socket:
+    """A socket made to listen at an address and port, or closed."""
+    try:
+        one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        one.setblocking(False)
+        one.bind(place)
+        one.listen()
+    except BaseException:
+        one.close()
+        raise
+    return one
 
 
 def _page_address(host: str, port: int) -> str:
