@@ -18,7 +18,7 @@ from graspatlas.mimics import Mechanism
 from graspatlas.robot_files import find_file, package_folders, robots_folder
 from graspatlas.tables import checked_table, numbers
 from graspatlas.urdf import joint_limits, joints_of_kind, lock_joints, mimics, moving_joints, with_followers_limited
-from graspatlas.urdf_checks import check_urdf
+from graspatlas.urdf_checks import LARGEST, check_urdf
 
 __all__ = ["Body", "Hand", "robots_folder"]
 
@@ -164,6 +164,10 @@ class Hand(Body):
                 or not self.limits[joint][0] < self.limits[joint][1]
             ):
                 raise GraspAtlasError(f"limits of joint '{joint}' must be (lower, upper), got {self.limits[joint]}")
+            if any(LARGEST <= abs(end) < np.inf for end in self.limits[joint]):
+                raise GraspAtlasError(
+                    f"limits of joint '{joint}' must be below {LARGEST:g} or infinite, got {self.limits[joint]}"
+                )
         for info in self.model.hand_joints if self.limits else ():
             if info.name in self.limits and info.q_size != 1:
                 raise GraspAtlasError(f"joint '{info.name}' is continuous and has no limits; make it revolute")

@@ -6,7 +6,6 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import fields
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from graspatlas.archives import DamagedArchive, read_arrays
 from graspatlas.atlas import LARGEST, Atlas, Status
 from graspatlas.errors import GraspAtlasError
-from graspatlas.files import is_folder, opened, replaced
+from graspatlas.files import is_folder, opened, replaced, stated_path
 from graspatlas.problem import Problem
 from graspatlas.quality import quality_name
 from graspatlas.refinement import Refinement
@@ -85,7 +84,7 @@ def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
     Raises:
         GraspAtlasError: If the file is missing, damaged, or of another version.
     """
-    source = Path(path)
+    source = stated_path(path, "read result")
     if is_folder(source):
         source = source / "result.npz"
     try:
@@ -118,7 +117,7 @@ def _read(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, Any]]:
     return header, arrays
 
 
-def _parts(header: Mapping[str, Any], arrays: dict[str, Any], source: Path) -> dict[str, Any]:
+def _parts(header: Mapping[str, Any], arrays: dict[str, Any], source: os.PathLike[str]) -> dict[str, Any]:
     """Attributes of a result, once all of them are sound."""
     try:
         problem = Problem.from_dict(header["problem"])
