@@ -24,18 +24,24 @@ def started_as_program() -> bool:
     return os.path.splitext(os.path.basename(words[0]))[0] == _PROGRAM
 
 
-def _end_at_once() -> None:
-    """Let Ctrl-C end the process, as it ends those that do not handle it: shells then report status 130."""
-    ours = threading.current_thread() is threading.main_thread()
-    if ours and started_as_program() and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
+def _end_at_once() -> bool:
+    """Let Ctrl-C end the process, as it ends those that do not handle it: shells then report status 130.
+
+    Returns:
+        Whether that was changed.
+    """
+    ours = threading.current_thread() is threading.main_thread() and started_as_program()
+    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        return False
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    return True
 
 
 def hear_interrupts() -> None:
     """Let Ctrl-C raise KeyboardInterrupt again, as soon as somebody waits for it."""
-    ours = threading.current_thread() is threading.main_thread()
-    if ours and started_as_program() and signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
+    if _CHANGED and signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-_end_at_once()
+#: Python names another program once the module of ``python -m`` is found, so this is asked once.
+_CHANGED = _end_at_once()
