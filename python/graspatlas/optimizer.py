@@ -33,6 +33,8 @@ __all__ = ["build_atlas", "optimize"]
 _NO_LIMIT = 2**62
 #: Most threads that may be asked for: no machine has more cores.
 MOST_THREADS = 4096
+#: More than so many threads a core, and than so many in all, are not started: they would only wait for one another.
+THREADS_A_CORE, ALWAYS_ALLOWED = 4, 32
 
 
 def build_atlas(
@@ -85,6 +87,7 @@ def build_atlas(
     seconds = float("inf") if max_seconds is None else _positive("max_seconds", max_seconds)
     memory = available_bytes() if max_bytes is None else _positive("max_bytes", max_bytes)
     workers = available_threads() if threads is None else _whole("threads", threads, MOST_THREADS)
+    workers = min(workers, max(ALWAYS_ALLOWED, THREADS_A_CORE * available_threads()))
     start = time.perf_counter()
     first = _numbers("x0", x0)
     folder = (
