@@ -65,7 +65,7 @@ def test_view_serves_the_page_and_ends(can_result: ga.Result, capsys: pytest.Cap
         assert visualizer.static_html().count("fetch(") > 12
     finally:
         close(visualizer)
-    assert visualizer.window.server_proc.returncode is not None
+    assert not visualizer.window.server.running
 
 
 def test_view_ends_cleanly_when_interrupted(can_result: ga.Result, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -74,7 +74,7 @@ def test_view_ends_cleanly_when_interrupted(can_result: ga.Result, monkeypatch: 
 
     monkeypatch.setattr("graspatlas.viewer.live.time.sleep", interrupt)
     visualizer = view(can_result, open_browser=False)
-    assert visualizer.window.server_proc.returncode is not None
+    assert not visualizer.window.server.running
 
 
 @pytest.mark.browser

@@ -1,5 +1,7 @@
 """Globally best grasps: an atlas of all feasible grasps, and any quality index read on it."""
 
+from graspatlas import start_up as start_up  # first: the others take a second  # isort: skip
+
 import importlib
 import typing
 

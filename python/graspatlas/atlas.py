@@ -169,7 +169,7 @@ class Atlas(Light):
             kinds = "b" if name == "nearly_singular" else "iu" if whole else "f"
             if array.shape != shape or array.dtype.kind not in kinds:
                 raise GraspAtlasError(f"array '{name}' has shape {array.shape} and type {array.dtype}, not {shape}")
-            if kinds == "f" and not (np.abs(array) < LARGEST).all():
+            if kinds == "f" and not (np.abs(array.astype(float)) < LARGEST).all():
                 raise GraspAtlasError(f"array '{name}' holds a number that is not finite, or not below {LARGEST:g}")
         ends_fit = all(
             start[0] == 0 and start[-1] == end and (np.diff(start) > k).all()

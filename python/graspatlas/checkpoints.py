@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspatlas import _core
+from graspatlas.archives import DamagedArchive, read_arrays
 from graspatlas.errors import GraspAtlasError
-from graspatlas.files import replaced
+from graspatlas.files import opened, replaced, stated_path
 from graspatlas.systems import AnySystem
 
 __all__ = ["CheckpointFolder", "run_digest"]
@@ -22,6 +23,11 @@ __all__ = ["CheckpointFolder", "run_digest"]
 VERSION = 3
 #: Arrays of which each file of a checkpoint holds the part that came after the file before it.
 _GROWING = ("centers", "bases", "residuals", "regularities", "keys")
+#: What each array of a checkpoint may hold: floating-point numbers, whole ones.
+_KINDS = {
+    **dict.fromkeys(("centers", "bases", "residuals", "regularities", "closed_vertices"), "f"),
+    **dict.fromkeys(("keys", "closed_charts", "closed_reasons", "generation", "again", "paused", "counts"), "iu"),
+}
 #: A step away from x0 at which the system is looked at, to tell it from others [units of the tangent space].
 _STEP = 1e-3
 
@@ -49,7 +55,7 @@ class CheckpointFolder:
     """
 
     def __init__(self, folder: str | os.PathLike[str], digest: str) -> None:
-        self.folder = Path(folder)
+        self.folder = stated_path(folder, "keep a checkpoint at")
         self.digest = digest
         self._n_files = self._n_charts = 0
 
@@ -63,24 +69,28 @@ class CheckpointFolder:
         parts = [self._read(path) for path in paths]
         if not parts:
             return None
-        out = {**parts[-1], **{name: np.concatenate([part[name] for part in parts]) for name in _GROWING}}
+        out = {**parts[-1], **{name: np.concatenate([part[name].ravel() for part in parts]) for name in _GROWING}}
         self._n_files, self._n_charts = len(parts), len(out["keys"])
         return out
 
     def _read(self, path: Path) -> dict[str, Any]:
         try:
-            with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-                part = {name: file[name] for name in file.files}
+            with opened(path, "checkpoint") as stream:
+                part = read_arrays(stream)
             digest = str(part.pop("digest"))
-        except Exception:  # a damaged archive fails in many ways, none of which executes anything
+        except OSError as error:
+            raise GraspAtlasError(f"cannot read checkpoint '{path}': {error.strerror or error}") from None
+        except (DamagedArchive, KeyError) as error:
             raise GraspAtlasError(
-                f"'{path}' is damaged or no checkpoint; delete '{self.folder}' to begin anew"
+                f"'{path}' is damaged or no checkpoint ({error}); delete '{self.folder}' to begin anew"
             ) from None
         if digest != self.digest:
             raise GraspAtlasError(
                 f"'{self.folder}' holds the checkpoint of another problem, of other options or of another version: "
                 "finish that run, delete the folder, or choose another one"
             )
+        if set(part) != set(_KINDS) or any(array.dtype.kind not in _KINDS[name] for name, array in part.items()):
+            raise GraspAtlasError(f"'{path}' is damaged or no checkpoint; delete '{self.folder}' to begin anew")
         return part
 
     def write(self, builder: _core.AtlasBuilder) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from collections.abc import Sequence
 from dataclasses import fields
@@ -20,7 +19,7 @@ from graspatlas.checkpoints import CheckpointFolder
 from graspatlas.components import Components, SearchStatus, find_components
 from graspatlas.errors import GraspAtlasError
 from graspatlas.exit_status import FAILED, INTERRUPTED, MISUSE
-from graspatlas.files import writable_folder
+from graspatlas.files import replaced, writable_folder
 from graspatlas.optimizer import optimize
 from graspatlas.problem_commands import add_problem_commands
 from graspatlas.problems import bundled_problems, load_problem
@@ -28,6 +27,9 @@ from graspatlas.quality import INDICES, quality_name
 from graspatlas.requirements import REQUIREMENTS, parse_requirement
 from graspatlas.result import Result
 from graspatlas.result_commands import add_result_commands
+from graspatlas.start_up import hear_interrupts
+from graspatlas.terminal import finish_output, printable, say, shortened, silence_output
+from graspatlas.words import path_word
 
 __all__ = ["main"]
 
@@ -42,25 +44,55 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Exit status: 0, 1 where no grasp meets the requirements or a check fails, 2 for wrong input, 130 when
         interrupted.
     """
-    options = _parser().parse_args(arguments)
+    hear_interrupts()
     try:
-        return int(options.run(options))
+        status = _run(arguments)
+        finish_output()
+        return status
     except GraspAtlasError as error:
-        print(f"graspatlas: error: {error}", file=sys.stderr)
-        return MISUSE
+        return _misuse(error)
     except BrokenPipeError:  # the reader of our output has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        silence_output()
         return 0
     except KeyboardInterrupt:
-        print("graspatlas: interrupted", file=sys.stderr)
+        say("graspatlas: interrupted", file=sys.stderr)
         return INTERRUPTED
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    """Run a command; its exit status."""
+    try:
+        options = _parser().parse_args(arguments)
+        return int(options.run(options))
+    except SystemExit:  # help is printed, or a word is wrong
+        finish_output()
+        raise
+    except MemoryError:
+        return _misuse("there is not enough memory for this; choose a larger radius or a smaller input")
+    except RecursionError:
+        return _misuse("the input is nested too deeply to be one; correct it")
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        place = f" '{error.filename}'" if error.filename else ""
+        return _misuse(f"{error.strerror or error}{place}; make sure that it can be read and written")
+
+
+def _misuse(reason: object) -> int:
+    say(shortened(" ".join(f"graspatlas: error: {reason}".split("\n"))), file=sys.stderr)
+    return MISUSE
 
 
 class _Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, like all others."""
 
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """Help and version; argparse keeps quiet where they cannot be written."""
+        say(message, file=None if file is sys.stdout else file, end="")
+
     def error(self, message: str) -> NoReturn:
-        self.exit(MISUSE, f"graspatlas: error: {message}; see '{self.prog} --help'\n")
+        line = shortened(printable(f"graspatlas: error: {message}; see '{self.prog} --help'"))
+        self.exit(MISUSE, line + "\n")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -124,7 +156,7 @@ def _parser() -> argparse.ArgumentParser:
         "limits the whole search",
     )
     best.add_argument("--threads", type=int, metavar="N", help="threads to use, all cores by default; same result")
-    best.add_argument("--output", type=Path, metavar="FOLDER", help="write result.npz and summary.json there")
+    best.add_argument("--output", type=path_word, metavar="FOLDER", help="write result.npz and summary.json there")
     best.add_argument("--json", action="store_true", help="print one JSON object on standard output")
     best.set_defaults(run=_optimize)
 
@@ -135,7 +167,7 @@ def _parser() -> argparse.ArgumentParser:
         "reproduce", help="run the paper's experiments and write a page to lay beside the paper"
     )
     again.add_argument(
-        "--output", type=Path, required=True, metavar="FOLDER", help="write index.html and its files there"
+        "--output", type=path_word, required=True, metavar="FOLDER", help="write index.html and its files there"
     )
     again.add_argument("--experiment", metavar="NAME", help="only this experiment")
     again.set_defaults(run=_reproduce)
@@ -146,7 +178,7 @@ def _add_sweep(commands: Any) -> None:
     many = commands.add_parser("sweep", help="run many problems with many options, on all cores or a cluster")
     many.add_argument("problems", nargs="+", metavar="PROBLEM", help="names of bundled problems, or problem files")
     many.add_argument(
-        "--output", type=Path, required=True, metavar="FOLDER", help="keep the rows in runs.parquet there"
+        "--output", type=path_word, required=True, metavar="FOLDER", help="keep the rows in runs.parquet there"
     )
     many.add_argument("--dimension", type=int, nargs="+", default=[], metavar="K", help="dimensions k to try")
     many.add_argument("--radius", type=float, nargs="+", default=[], metavar="R", help="radii of a chart to try")
@@ -163,17 +195,17 @@ def _add_sweep(commands: Any) -> None:
 
 
 def _list(_: argparse.Namespace) -> int:
-    print("problems:")
+    say("problems:")
     for name in bundled_problems():
         problem = load_problem(name)
-        print(f"  {name:22} t = {problem.full_dimension}. {problem.description}")
-    print("quality indices:")
+        say(f"  {name:22} t = {problem.full_dimension}. {problem.description}")
+    say("quality indices:")
     for name, index in INDICES.items():
-        print(f"  {name:26} {(index.__doc__ or '').splitlines()[0]}")
-    print("requirements:")
+        say(f"  {name:26} {(index.__doc__ or '').splitlines()[0]}")
+    say("requirements:")
     for name, requirement in REQUIREMENTS.items():
         values = ":".join(field.name.upper() for field in fields(requirement))
-        print(f"  {name}:{values}  {(requirement.__doc__ or '').splitlines()[0]}")
+        say(f"  {name}:{values}  {(requirement.__doc__ or '').splitlines()[0]}")
     return 0
 
 
@@ -192,7 +224,7 @@ def _optimize(options: argparse.Namespace) -> int:
         _write_json(result.summary(), folder / "summary.json")
         if result.status is Status.COMPLETE:
             CheckpointFolder.remove(folder / "checkpoint")
-    print(json.dumps(result.summary()) if options.json else _report(result, folder))
+    say(json.dumps(result.summary()) if options.json else _report(result, folder))
     if result.status is Status.INTERRUPTED:
         return INTERRUPTED
     return 0 if result.feasible.any() else FAILED
@@ -209,10 +241,10 @@ def _report_components(found: Components, options: argparse.Namespace, folder: P
         for number, result in enumerate(found.results[1:], start=2):
             result.save(others / f"{number}.npz")
     if options.json:
-        print(json.dumps(found.summary()))
+        say(json.dumps(found.summary()))
     else:
-        print("\n".join(_component_lines(found)))
-        print(_report(best, folder))
+        say(*_component_lines(found))
+        say(_report(best, folder))
     if found.status is SearchStatus.INTERRUPTED:
         return INTERRUPTED
     return 0 if best.feasible.any() else FAILED
@@ -235,10 +267,8 @@ def _component_lines(found: Components) -> list[str]:
 
 
 def _write_json(table: dict[str, Any], path: Path) -> None:
-    try:
-        path.write_text(json.dumps(table, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise GraspAtlasError(f"cannot write '{path}': {error.strerror or error}") from None
+    with replaced(path) as stream:
+        stream.write((json.dumps(table, indent=2) + "\n").encode("utf-8"))
 
 
 def _report(result: Result, folder: Path | None) -> str:
@@ -317,16 +347,16 @@ def _sweep(options: argparse.Namespace) -> int:
     )
     if options.json:
         counts = {"runs": len(sweep.rows), "skipped": sweep.skipped, "failed": len(sweep.failed)}
-        print(json.dumps({**counts, "missing": sweep.missing, "rows": str(sweep.path), "best": sweep.best()}))
+        say(json.dumps({**counts, "missing": sweep.missing, "rows": str(sweep.path), "best": sweep.best()}))
     else:
-        print(f"{len(sweep.rows)} runs in {sweep.path}: {sweep.skipped} from before, {len(sweep.failed)} failed")
+        say(f"{len(sweep.rows)} runs in {sweep.path}: {sweep.skipped} from before, {len(sweep.failed)} failed")
         for row in sweep.failed:
-            print(f"  {row['file']}: {row['error']}")
+            say(f"  {row['file']}: {row['error']}")
         for name, row in sweep.best().items():
             options_of = ", ".join(f"{key} {row[key]:g}" for key in ("dimension", "radius", "epsilon"))
-            print(f"  best {name}: {row['quality_best']:.9g}, {row['problem']} with {options_of}; {row['status']}")
+            say(f"  best {name}: {row['quality_best']:.9g}, {row['problem']} with {options_of}; {row['status']}")
     if sweep.missing:
-        print(f"interrupted: {sweep.missing} runs are left; start the sweep again to go on", file=sys.stderr)
+        say(f"interrupted: {sweep.missing} runs are left; start the sweep again to go on", file=sys.stderr)
         return INTERRUPTED
     return FAILED if sweep.failed else 0
 
@@ -335,7 +365,7 @@ def _reproduce(options: argparse.Namespace) -> int:
     from graspatlas.reproduce import reproduce  # slow to import
 
     page = reproduce(options.output, options.experiment)
-    print(f"wrote {page}: open it in a browser")
+    say(f"wrote {page}: open it in a browser")
     return 0
 
 

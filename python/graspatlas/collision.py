@@ -13,6 +13,7 @@ from tqdm import tqdm
 
 from graspatlas.collision_shapes import convex_hull, convex_solid, is_mesh, thinner
 from graspatlas.errors import GraspAtlasError
+from graspatlas.mesh_files import check_meshes
 
 if TYPE_CHECKING:
     from graspatlas.hand import Body
@@ -211,6 +212,7 @@ def _may_touch(shape: Any, surface: bool, touch_depth: float) -> Any | None:
 def _shapes(body: Body, model: Any) -> Any:
     import pinocchio as pin
 
+    check_meshes(body)
     try:
         geometry = pin.buildGeomFromUrdfString(model, body.urdf, pin.COLLISION, package_dirs=list(body.package_dirs))
     except (ValueError, RuntimeError) as error:

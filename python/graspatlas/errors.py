@@ -9,6 +9,9 @@ from graspatlas._core import GraspAtlasError
 
 __all__ = ["GraspAtlasError", "unknown_name"]
 
+#: Most names that a message lists.
+MOST_NAMES = 40
+
 
 def unknown_name(kind: str, name: object, known: Iterable[str], place: str = "") -> GraspAtlasError:
     """Error for a name that is not known, with the nearest one that is.
@@ -26,6 +29,8 @@ def unknown_name(kind: str, name: object, known: Iterable[str], place: str = "")
     near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
     near = near or [known_name for known_name in names if len(str(name)) > 2 and str(name) in known_name]
     where = f"not {place}" if place else "unknown"
-    hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(names) or 'none'}"
+    more = len(names) - MOST_NAMES
+    listed = ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+    hint = f"did you mean '{near[0]}'?" if near else f"known: {listed or 'none'}"
     shown = " ".join(str(name).split())[:80]
     return GraspAtlasError(f"{kind} '{shown}' is {where}; {hint}")

@@ -7,31 +7,23 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.files import read_text
 from graspatlas.mimics import Mechanism
 from graspatlas.pickling import Light
 from graspatlas.robot_files import find_file, package_folders, robots_folder
 from graspatlas.tables import checked_table, numbers
 from graspatlas.urdf import joint_limits, joints_of_kind, lock_joints, mimics, moving_joints, with_followers_limited
+from graspatlas.urdf_checks import LARGEST, check_urdf
 
 __all__ = ["Body", "Hand", "robots_folder"]
 
 Array = NDArray[np.float64]
-
-
-def _check_xml(name: str, text: str) -> None:
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise GraspAtlasError(f"the URDF of '{name}' is not XML: {error}") from None
-    if root.tag != "robot":
-        raise GraspAtlasError(f"the URDF of '{name}' must hold a <robot>, not a <{root.tag}>")
 
 
 @dataclass(frozen=True)
@@ -55,7 +47,7 @@ class Body(Light):
     package_paths: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        _check_xml(self.name, self.urdf)
+        check_urdf(self.name, self.urdf)
 
     def __repr__(self) -> str:
         origin = self.urdf_path or f"a URDF of {len(self.urdf)} characters"
@@ -78,8 +70,8 @@ class Body(Light):
         stated = tuple(str((folder or Path()) / place) for place in package_paths)
         path = find_file(urdf, folder, stated)
         try:
-            text = path.read_text(encoding="utf-8")
-            srdf_text = find_file(srdf, folder, stated).read_text(encoding="utf-8") if srdf else ""
+            text = read_text(path)
+            srdf_text = read_text(find_file(srdf, folder, stated)) if srdf else ""
         except (OSError, UnicodeDecodeError) as error:
             raise GraspAtlasError(f"cannot read '{urdf}': {error}") from None
         return {
@@ -178,6 +170,10 @@ class Hand(Body):
                 or not self.limits[joint][0] < self.limits[joint][1]
             ):
                 raise GraspAtlasError(f"limits of joint '{joint}' must be (lower, upper), got {self.limits[joint]}")
+            if any(LARGEST <= abs(end) < np.inf for end in self.limits[joint]):
+                raise GraspAtlasError(
+                    f"limits of joint '{joint}' must be below {LARGEST:g} or infinite, got {self.limits[joint]}"
+                )
         for info in self.model.hand_joints if self.limits else ():
             if info.name in self.limits and info.q_size != 1:
                 raise GraspAtlasError(f"joint '{info.name}' is continuous and has no limits; make it revolute")

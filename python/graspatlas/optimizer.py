@@ -31,6 +31,10 @@ from graspatlas.tables import number, number_array, shown
 __all__ = ["build_atlas", "optimize"]
 
 _NO_LIMIT = 2**62
+#: Most threads that may be asked for: no machine has more cores.
+MOST_THREADS = 4096
+#: More than so many threads a core, and than so many in all, are not started: they would only wait for one another.
+THREADS_A_CORE, ALWAYS_ALLOWED = 4, 32
 
 
 def build_atlas(
@@ -82,10 +86,13 @@ def build_atlas(
     charts = _NO_LIMIT if max_charts is None else _whole("max_charts", max_charts)
     seconds = float("inf") if max_seconds is None else _positive("max_seconds", max_seconds)
     memory = available_bytes() if max_bytes is None else _positive("max_bytes", max_bytes)
-    workers = available_threads() if threads is None else _whole("threads", threads)
+    workers = available_threads() if threads is None else _whole("threads", threads, MOST_THREADS)
+    workers = min(workers, max(ALWAYS_ALLOWED, THREADS_A_CORE * available_threads()))
     start = time.perf_counter()
     first = _numbers("x0", x0)
-    folder = CheckpointFolder(checkpoint, run_digest(system, first, radius, epsilon)) if checkpoint else None
+    folder = (
+        CheckpointFolder(checkpoint, run_digest(system, first, radius, epsilon)) if checkpoint is not None else None
+    )
     builder = _builder(system, first, (radius, epsilon, workers), folder)
     growth = Growth(builder, system, first, radius, epsilon)
     status = growth.run(Limits(charts, start + seconds, memory), progress, folder)
@@ -241,7 +248,9 @@ def _positive(name: str, value: float) -> float:
     return float(value)
 
 
-def _whole(name: str, value: int) -> int:
+def _whole(name: str, value: int, most: int | None = None) -> int:
     if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < 1:
         raise GraspAtlasError(f"{name} must be a whole number of at least 1, got {shown(value)}")
+    if most is not None and int(value) > most:
+        raise GraspAtlasError(f"{name} must be at most {most}, got {shown(value)}")
     return min(int(value), _NO_LIMIT)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 from pathlib import Path
 from typing import Any
 
 from graspatlas.diagnosis import PROBLEM, Finding, diagnose, report
 from graspatlas.errors import GraspAtlasError
+from graspatlas.files import replaced
 from graspatlas.problems import load_problem
+from graspatlas.terminal import say
+from graspatlas.words import path_word
 
 __all__ = ["add_problem_commands"]
 
@@ -22,7 +26,7 @@ def add_problem_commands(commands: Any) -> None:
         help="URDF of the hand; or example_robot_data:NAME, or robot_descriptions:NAME",
     )
     new.add_argument("--object", metavar="FILE", help="URDF or mesh of the object")
-    new.add_argument("--output", type=Path, metavar="FILE", help="file to write; standard output by default")
+    new.add_argument("--output", type=path_word, metavar="FILE", help="file to write; standard output by default")
     new.set_defaults(run=_new)
 
     check = commands.add_parser("check", help="look at all that decides whether an atlas of a problem can be traced")
@@ -33,7 +37,7 @@ def add_problem_commands(commands: Any) -> None:
     check.set_defaults(run=_check)
 
     schema = commands.add_parser("schema", help="write the JSON Schema of problem files, for editors")
-    schema.add_argument("--output", type=Path, metavar="FILE", help="file to write; standard output by default")
+    schema.add_argument("--output", type=path_word, metavar="FILE", help="file to write; standard output by default")
     schema.set_defaults(run=_schema)
 
 
@@ -54,7 +58,7 @@ def _check(options: argparse.Namespace) -> int:
     except ProblemFileError as error:
         hint = "every field is explained in docs/problem_files.md"
         findings = [Finding(PROBLEM, "problem file", fault, hint) for fault in error.faults]
-    print(json.dumps([finding.to_dict() for finding in findings]) if options.json else report(findings))
+    say(json.dumps([finding.to_dict() for finding in findings]) if options.json else report(findings))
     return int(any(finding.mark == PROBLEM for finding in findings))
 
 
@@ -68,12 +72,9 @@ def _schema(options: argparse.Namespace) -> int:
 def _write(text: str, path: Path | None, *, keep: bool) -> None:
     """Write to a file, or to standard output; with `keep`, a file that exists is not overwritten."""
     if path is None:
-        print(text, end="")
+        say(text, end="")
         return
-    try:
-        with path.open("x" if keep else "w", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        raise GraspAtlasError(f"'{path}' exists; choose another name or remove it") from None
-    except OSError as error:
-        raise GraspAtlasError(f"cannot write '{path}': {error.strerror}") from None
+    if keep and os.path.lexists(path):
+        raise GraspAtlasError(f"'{path}' exists; choose another name or remove it")
+    with replaced(path) as stream:
+        stream.write(text.encode("utf-8"))

@@ -6,19 +6,20 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import fields
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
-from graspatlas.atlas import Atlas, Status
+from graspatlas.archives import DamagedArchive, read_arrays
+from graspatlas.atlas import LARGEST, Atlas, Status
 from graspatlas.errors import GraspAtlasError
-from graspatlas.files import replaced
+from graspatlas.files import is_folder, opened, replaced, stated_path
 from graspatlas.problem import Problem
 from graspatlas.quality import quality_name
 from graspatlas.refinement import Refinement
 from graspatlas.requirements import Require, parse_requirement, requirement_name
-from graspatlas.tables import number
+from graspatlas.tables import number, shown
 
 if TYPE_CHECKING:
     from graspatlas.result import Result
@@ -27,6 +28,8 @@ __all__ = ["read_result", "save_result"]
 
 FORMAT = "graspatlas result"
 FORMAT_VERSION = 1
+#: How far a stored quaternion may be from length one.
+UNIT_TOLERANCE = 1e-6
 
 _REFINEMENT_FLAGS = ("all_motions", "complete")
 _REFINEMENT_ARRAYS = tuple(f.name for f in fields(Refinement) if f.name not in _REFINEMENT_FLAGS)
@@ -81,11 +84,11 @@ def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
     Raises:
         GraspAtlasError: If the file is missing, damaged, or of another version.
     """
-    source = Path(path)
-    if source.is_dir():
+    source = stated_path(path, "read result")
+    if is_folder(source):
         source = source / "result.npz"
     try:
-        with open(source, "rb") as stream:
+        with opened(source, "result") as stream:
             header, arrays = _read(stream)
     except FileNotFoundError:
         raise GraspAtlasError(
@@ -93,26 +96,28 @@ def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
         ) from None
     except OSError as error:
         raise GraspAtlasError(f"cannot read result '{source}': {error.strerror or error}") from None
-    except Exception:  # a damaged archive fails in many ways, none of which executes anything
-        raise GraspAtlasError(f"'{source}' is damaged or not a graspatlas result; compute it again") from None
+    except GraspAtlasError:
+        raise
+    except (DamagedArchive, KeyError, ValueError, RecursionError) as error:
+        reason = f" ({error})" if isinstance(error, DamagedArchive) else ""
+        raise GraspAtlasError(f"'{source}' is damaged or not a graspatlas result{reason}; compute it again") from None
     if header.get("version") != FORMAT_VERSION:
-        raise GraspAtlasError(
-            f"result '{source}' has version {header.get('version')}, this graspatlas reads {FORMAT_VERSION}"
-        )
+        version = shown(header.get("version"))
+        raise GraspAtlasError(f"result '{source}' has version {version}, this graspatlas reads {FORMAT_VERSION}")
     return _parts(header, arrays, source)
 
 
 def _read(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, Any]]:
     """Header and arrays of a result file."""
-    with np.load(stream, allow_pickle=False) as file:
-        arrays = {name: file[name] for name in file.files}
+    arrays = read_arrays(stream)
     header = json.loads(str(arrays.pop("header")))
+    json.dumps(header, ensure_ascii=False).encode("utf-8")  # a name may hold half of a letter, which nothing can write
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise ValueError("its header is another one")
     return header, arrays
 
 
-def _parts(header: Mapping[str, Any], arrays: dict[str, Any], source: Path) -> dict[str, Any]:
+def _parts(header: Mapping[str, Any], arrays: dict[str, Any], source: os.PathLike[str]) -> dict[str, Any]:
     """Attributes of a result, once all of them are sound."""
     try:
         problem = Problem.from_dict(header["problem"])
@@ -133,8 +138,8 @@ def _parts(header: Mapping[str, Any], arrays: dict[str, Any], source: Path) -> d
         for values in (qualities, *others.values()):
             if values.shape != qualities.shape or values.dtype.kind != "f" or np.isnan(values).any():
                 raise GraspAtlasError("qualities must be numbers, one a chart")
-        if not atlas.radius > 0.0 or not 0.0 < atlas.epsilon < 1.0 or not isinstance(header["quality"], str):
-            raise GraspAtlasError("its header holds a value that cannot be")
+        _check_header(header, atlas)
+        check_configurations(problem, atlas.centers, "the centre of chart")
         return {
             "problem": problem,
             "atlas": atlas,
@@ -147,8 +152,50 @@ def _parts(header: Mapping[str, Any], arrays: dict[str, Any], source: Path) -> d
             "others": others,
             "refinement": refinement,
         }
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise GraspAtlasError(f"result '{source}' is damaged ({error}); compute it again") from None
+    except GraspAtlasError as error:
+        raise GraspAtlasError(f"result '{source}' is damaged: {error}; compute it again") from None
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError, RecursionError) as error:
+        raise GraspAtlasError(f"result '{source}' is damaged ({shown(error)}); compute it again") from None
+
+
+def _check_header(header: Mapping[str, Any], atlas: Atlas) -> None:
+    """Make sure that numbers and names of a header are ones that a result can have.
+
+    Raises:
+        GraspAtlasError: If one is not.
+    """
+    seconds = number(header["quality_seconds"], "quality_seconds")
+    if not 0.0 < atlas.radius < LARGEST:
+        raise GraspAtlasError(f"radius must be positive and below {LARGEST:g}, got {atlas.radius:g}")
+    if not 0.0 < atlas.epsilon < 1.0:
+        raise GraspAtlasError(f"epsilon must lie between 0 and 1, got {atlas.epsilon:g}")
+    if not (0.0 <= atlas.seconds < np.inf and 0.0 <= seconds < np.inf):
+        raise GraspAtlasError("seconds must be finite and not negative")
+    if not isinstance(header["quality"], str):
+        raise GraspAtlasError(f"quality must be the name of an index, got {shown(header['quality'])}")
+
+
+def check_configurations(problem: Problem, X: NDArray[np.float64], what: str) -> None:
+    """Make sure that configurations name one each: quaternions, cosines and sines have length one.
+
+    Args:
+        problem: The problem.
+        X: Configurations [n, configuration_size].
+        what: What they are, for the message.
+
+    Raises:
+        GraspAtlasError: If one is off.
+    """
+    n_hand = problem.hand.model.hand_q_size
+    turning = [joint.q_index for joint in problem.hand.model.hand_joints if joint.q_size == 2]
+    parts = [("the cosine and sine of a continuous joint", slice(at, at + 2)) for at in turning]
+    at, size = (n_hand + 3, 4) if problem.object_joint == "free_flyer" else (n_hand + 2, 2)
+    parts.append(("the object's rotation", slice(at, at + size)))
+    for name, columns in parts:
+        lengths = np.linalg.norm(X[:, columns], axis=1)
+        off = np.flatnonzero(~(np.abs(lengths - 1.0) < UNIT_TOLERANCE))
+        if len(off):
+            raise GraspAtlasError(f"{name} has length {lengths[off[0]]:g}, not 1, at {what} {off[0]}")
 
 
 def _refinement(flags: Mapping[str, Any] | None, arrays: dict[str, Any], problem: Problem) -> Refinement | None:
@@ -162,6 +209,7 @@ def _refinement(flags: Mapping[str, Any] | None, arrays: dict[str, Any], problem
     for name, array in parts.items():
         if p == 0 or array.shape != shapes[name] or array.dtype.kind != kinds[name] or not np.isfinite(array).all():
             raise GraspAtlasError(f"the refined {name} have shape {array.shape} and type {array.dtype}")
+    check_configurations(problem, parts["x"], "refined grasp")
     return Refinement(**parts, all_motions=bool(flags["all_motions"]), complete=bool(flags["complete"]))
 
 

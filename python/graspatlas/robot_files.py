@@ -9,6 +9,7 @@ from importlib import metadata, resources
 from pathlib import Path
 
 from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.files import is_file
 
 __all__ = ["described_robot", "example_robot", "find_file", "package_folders", "robots_folder"]
 
@@ -62,8 +63,10 @@ def find_file(path: str | Path, folder: Path | None, stated: tuple[str, ...] = (
     else:
         places = [(folder or Path()) / wanted, robots_folder() / wanted]
     for place in places:
-        if place.is_file():
+        if is_file(place):
             return place
+    if len(str(path)) > LONGEST_PATH or "\0" in str(path):
+        raise GraspAtlasError(f"{str(path)!r:.60}... cannot be the path of a file: it is too long, or holds a null")
     looked = " and ".join(dict.fromkeys(map(str, places)))
     raise GraspAtlasError(f"file '{path}' does not exist; looked for it at {looked}")
 
@@ -86,6 +89,8 @@ def example_robot(name: str) -> str:
     return PACKAGE + found[name].relative_to(share).as_posix()
 
 
+#: Paths that are longer are not quoted [characters].
+LONGEST_PATH = 250
 #: Longest reason that is quoted [characters].
 REASON = 200
 

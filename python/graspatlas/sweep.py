@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from tqdm import tqdm
 
 from graspatlas import __version__
 from graspatlas.errors import GraspAtlasError
-from graspatlas.files import writable_folder
+from graspatlas.files import opened, replaced, writable_folder
 from graspatlas.optimizer import optimize
 from graspatlas.problem import Problem
 from graspatlas.problems import load_problem
@@ -38,6 +39,8 @@ __all__ = ["ROWS", "Run", "Sweep", "run_sweep"]
 ROWS = "runs.parquet"
 #: Rows reach the disk at least this often while runs finish [s].
 WRITE_SECONDS = 5.0
+#: Whether PYTHONSAFEPATH keeps the current folder off the path of modules; older ones than 3.11 do not know it.
+KNOWS_SAFE_PATH = sys.version_info >= (3, 11)
 
 _TEXT, _NUMBER, _WHOLE, _FLAG, _NUMBERS, _TEXTS = "string", "float64", "int64", "bool_", "floats", "strings"
 #: Columns of a row and their types.
@@ -249,20 +252,64 @@ def _runs_of(file: str, fixed: Run, choices: Sequence[Sequence[Any]]) -> Iterato
 
 def _rows_as_they_come(runs: Sequence[Run], scheduler: str | None, workers: int | None) -> Iterator[dict[str, Any]]:
     """Rows of the runs in the order in which they end; a worker that dies fails its run only."""
-    import dask.distributed as dask
-
     broken = [run for run in runs if run.problem is None]
     yield from (run.row(error=run.error) for run in broken)
     sound = [run for run in runs if run.problem is not None]
     if not sound:
         return
-    if scheduler is None:
-        count = workers or len(os.sched_getaffinity(0))
-        place: Any = dask.LocalCluster(
-            n_workers=min(count, len(sound)), threads_per_worker=1, dashboard_address=None, silence_logs="ERROR"
+    with _safe_path():
+        yield from _solved(sound, scheduler, workers)
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    """Let workers start without looking for modules of the standard library in the current folder.
+
+    They start as ``python -c``, for which that folder comes first.
+    """
+    before = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["PYTHONSAFEPATH"]
+        else:
+            os.environ["PYTHONSAFEPATH"] = before
+
+
+@contextmanager
+def _empty_folder() -> Iterator[None]:
+    """The same for versions of Python that know no safe path: an empty folder is the current one meanwhile."""
+    here = os.getcwd()
+    with tempfile.TemporaryDirectory() as empty:
+        os.chdir(empty)
+        try:
+            yield
+        finally:
+            os.chdir(here)
+
+
+def _local_cluster(workers: int) -> Any:
+    """Workers on this machine, in the current folder."""
+    import dask.distributed as dask
+
+    with nullcontext() if KNOWS_SAFE_PATH else _empty_folder():
+        cluster = dask.LocalCluster(
+            n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs="ERROR"
         )
-    else:
-        place = scheduler
+    if not KNOWS_SAFE_PATH:
+        with dask.Client(cluster, set_as_default=False) as client:
+            client.run(os.chdir, os.getcwd())
+    return cluster
+
+
+def _solved(sound: Sequence[Run], scheduler: str | None, workers: int | None) -> Iterator[dict[str, Any]]:
+    """Rows of runs whose problem could be loaded."""
+    import dask.distributed as dask
+
+    count = min(workers or len(os.sched_getaffinity(0)), len(sound))
+    place: Any = _local_cluster(count) if scheduler is None else scheduler
     try:
         client = dask.Client(place, timeout="20s")
     except (OSError, ValueError) as error:
@@ -343,10 +390,11 @@ def _read(path: Path) -> dict[str, dict[str, Any]]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    if not path.exists():
+    if not os.path.lexists(path):
         return {}
     try:
-        table = pq.read_table(path, schema=_schema())
+        with opened(path) as stream:
+            table = pq.read_table(stream, schema=_schema())
     except (OSError, pa.ArrowException) as error:
         raise GraspAtlasError(
             f"'{path}' is no file of a sweep ({error}); move it away or choose another folder"
@@ -360,12 +408,5 @@ def _write(path: Path, rows: dict[str, dict[str, Any]]) -> None:
     import pyarrow.parquet as pq
 
     table = pa.Table.from_pylist(list(rows.values()), schema=_schema())
-    descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    os.close(descriptor)
-    try:
-        pq.write_table(table, temporary)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except OSError as error:
-        os.unlink(temporary)
-        raise GraspAtlasError(f"cannot write '{path}': {error.strerror or error}") from None
+    with replaced(path) as stream:
+        pq.write_table(table, stream)

@@ -62,8 +62,8 @@ void Atlas::look(Auditor& auditor, Look& at) const {
   }
 }
 
-// What a round looks at: every vertex that was closed for want of something better; behind the bounds of all charts that
-// are new; charts that may lose rank; random walks, of which every second begins at a chart that is new.
+// What a round looks at: every vertex that was closed for want of something better; behind the bounds of all charts
+// that are new; charts that may lose rank; random walks, of which every second begins at a chart that is new.
 void Atlas::begin_round(std::int64_t points) {
   next_look_ = 0;
   std::vector<int> at_bounds;

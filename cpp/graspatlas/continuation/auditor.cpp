@@ -22,7 +22,8 @@ constexpr double kHidden = 0.1;
 // Steps past a facet or beyond a vertex, as shares of the radius: the first, and the shortest before it is given up.
 constexpr double kMarchStep = 0.25, kShortestMarch = 1.0 / 4096.0;
 constexpr int kMarchSteps = 400;
-// Regularity, as a share of that at the centre, at which a chart loses rank; how far away, in radii; steps of the search.
+// Regularity, as a share of that at the centre, at which a chart loses rank; how far away, in radii; steps of the
+// search.
 constexpr double kRankLost = 0.1, kRankReach = 1.5;
 constexpr int kRankSteps = 5, kRankIterations = 4;
 // A step of the differences that regularity is derived by, as a share of the radius.
@@ -116,7 +117,8 @@ class Auditor::Walker {
 
   enum class Step { taken, out_of_bounds, failed };
 
-  /// A step of a length along a direction [k] of the tangent space, to where the two points' charts could be neighbours.
+  /// A step of a length along a direction [k] of the tangent space, to where the two points' charts could be
+  /// neighbours.
   Step step(const double* direction, double length) {
     const double norm = std::sqrt(squared_length(direction, k_));
     if (!(norm > 0.0)) return Step::failed;
@@ -351,8 +353,8 @@ int Auditor::look_behind_bounds(int slot, std::vector<Hole>& holes) {
   return points;
 }
 
-// Goes on along a tangent vector [n] by short steps until it has come as far as `reach`: then true. Every point is looked
-// up; false at the first hole, and where it cannot go on.
+// Goes on along a tangent vector [n] by short steps until it has come as far as `reach`: then true. Every point is
+// looked up; false at the first hole, and where it cannot go on.
 bool Auditor::march(Walker& walker, const double* direction, double reach, std::vector<Hole>& holes) {
   march_ended_by_bounds_ = false;
   std::copy_n(direction, n_, walker.heading.begin());

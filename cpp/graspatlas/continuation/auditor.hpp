@@ -22,7 +22,7 @@ struct Hole {
 class Dice {
  public:
   explicit Dice(std::uint64_t seed) : state_(seed) {}
-  std::uint64_t bits();                                                   ///< splitmix64
+  std::uint64_t bits();                                                     ///< splitmix64
   double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }  ///< in [0, 1)
   double normal();
 

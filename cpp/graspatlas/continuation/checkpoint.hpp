@@ -17,10 +17,10 @@ struct PausedTask {
 /// How far an audit of an atlas has come; the numbers are those before the round that is going on, or was the last.
 struct AuditState {
   bool done = false;
-  std::int64_t rounds = 0;         ///< rounds that found holes
-  std::int64_t holes = 0;          ///< charts that were begun at holes
-  std::int64_t new_first = 0;      ///< first chart that came after the last round
-  std::int64_t points = 0;         ///< points of random walks, all found covered; 0 before that, or when it was given up
+  std::int64_t rounds = 0;     ///< rounds that found holes
+  std::int64_t holes = 0;      ///< charts that were begun at holes
+  std::int64_t new_first = 0;  ///< first chart that came after the last round
+  std::int64_t points = 0;     ///< points of random walks, all found covered; 0 before that, or when it was given up
 };
 
 /// What an atlas in the making must keep to be made anew, to the bit, without projecting its charts again.

@@ -6,11 +6,11 @@ namespace graspatlas {
 
 namespace {
 
-// Two charts that are more doubtful than this are neighbours only if the newer leads to the older, and each to the other
-// in grave doubt: see squared_sheet_doubt. Charts of smooth manifolds are mostly below a hundredth.
+// Two charts that are more doubtful than this are neighbours only if the newer leads to the older, and each to the
+// other in grave doubt: see squared_sheet_doubt. Charts of smooth manifolds are mostly below a hundredth.
 constexpr double kDoubt = 0.05, kGraveDoubt = 0.2;
-// A projection from one chart leads to another when it comes as near as this to its centre, and to its tangent space, as
-// shares of the displacement. The first is for the curvature of the configuration space, where coordinates above one
+// A projection from one chart leads to another when it comes as near as this to its centre, and to its tangent space,
+// as shares of the displacement. The first is for the curvature of the configuration space, where coordinates above one
 // centre are not those above another; sheets are apart by half of kDoubt at least.
 constexpr double kMiss = 0.1, kOff = 0.2 * kDoubt;
 

@@ -59,10 +59,10 @@ inline bool tangent_spaces_agree(const double* Phi_i, const double* Phi_j, int k
   return true;
 }
 
-/// How doubtful it is that two charts lie on one sheet: how far d is from the sum of its parts in the two tangent spaces
-/// that the trapezoidal rule expects, beside |d|. On one sheet the offsets of d from the tangent spaces at its two ends
-/// are opposite, but for third derivatives; from one sheet to another they add up to twice the sheets' distance.
-/// Returns the square of that share; below zero only by rounding.
+/// How doubtful it is that two charts lie on one sheet: how far d is from the sum of its parts in the two tangent
+/// spaces that the trapezoidal rule expects, beside |d|. On one sheet the offsets of d from the tangent spaces at its
+/// two ends are opposite, but for third derivatives; from one sheet to another they add up to twice the sheets'
+/// distance. Returns the square of that share; below zero only by rounding.
 ///
 /// p_i = Phi_i d, p_j = Phi_j d, M = Phi_i Phi_j' [k x k], squared = |d|^2 > 0.
 inline double squared_sheet_doubt(const double* p_i, const double* p_j, const double* M, double squared, int k) {
@@ -130,8 +130,8 @@ class NeighbourTest {
   /// True when the point of the manifold above p in the tangent space at x_i is x_j, and none of another sheet.
   bool leads_to(const double* x_i, const double* Phi_i, const double* p, const double* x_j, const double* Phi_j);
 
-  /// True when both tangent spaces and the displacement from x_i to x_j leave no doubt that the two are on one sheet, or
-  /// one leads to the other. p = Phi_i (x_j (-) x_i), displacement is x_j (-) x_i.
+  /// True when both tangent spaces and the displacement from x_i to x_j leave no doubt that the two are on one sheet,
+  /// or one leads to the other. p = Phi_i (x_j (-) x_i), displacement is x_j (-) x_i.
   bool on_one_sheet(const double* x_i, const double* Phi_i, const double* p, const double* displacement,
                     const double* x_j, const double* Phi_j);
 

@@ -42,6 +42,8 @@ def checked_interval(value: Sequence[float], what: str) -> Interval:
     array = number_array(value, what)
     if array.shape != (2,) or not array[0] < array[1]:
         raise GraspAtlasError(f"{what} must be (lower, upper) with lower below upper, got {value!r}")
+    if (np.isfinite(array) & (np.abs(array) >= LARGEST)).any():
+        raise GraspAtlasError(f"{what} must have ends below {LARGEST:g}, or infinite ones, got {value!r}")
     return (float(array[0]), float(array[1]))
 
 

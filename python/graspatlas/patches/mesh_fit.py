@@ -14,6 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from graspatlas.errors import GraspAtlasError
+from graspatlas.files import is_file
 from graspatlas.patches.base import Array, Vector3, checked_length, checked_vector, placement
 from graspatlas.patches.spline import BSpline, clamped_knots
 
@@ -143,7 +144,7 @@ def _loaded(mesh: Any) -> tuple[Array, Indices]:
     trimesh = _trimesh()
     if isinstance(mesh, str | Path):
         path = Path(mesh)
-        if not path.is_file():
+        if not is_file(path):
             raise GraspAtlasError(f"there is no mesh file '{path}'; correct the path")
         try:
             mesh = trimesh.load_mesh(path)

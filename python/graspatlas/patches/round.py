@@ -39,7 +39,7 @@ class _Globe(AxialPatch):
     def __post_init__(self) -> None:
         super().__post_init__()
         low, high = self.v_interval or LATITUDES
-        if min(np.cos(low), np.cos(high)) < SINGULAR or max(-low, high) > 0.5 * np.pi:
+        if max(-low, high) > 0.5 * np.pi or min(np.cos(low), np.cos(high)) < SINGULAR:
             raise GraspAtlasError(
                 f"v_interval ({low:g}, {high:g}) reaches a pole of the {self.kind}, where longitudes meet: keep it "
                 "inside (-pi/2, pi/2), and turn the axis to have the poles elsewhere"

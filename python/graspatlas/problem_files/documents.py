@@ -15,6 +15,10 @@ Path = tuple[str | int, ...]
 
 #: A file with more fields than this, aliases counted as often as they stand, is refused.
 MOST_FIELDS = 1_000_000
+#: Tables and lists may stand within one another this often; those of a problem do so less than ten times.
+MOST_LEVELS = 50
+#: Longest whole number [digits]: larger ones are no numbers for a computer's arithmetic.
+MOST_DIGITS = 300
 _CORE = "tag:yaml.org,2002:"
 _WORDS = {"true": True, "false": False}
 
@@ -53,6 +57,17 @@ class _Loader(yaml.SafeLoader):
     """
 
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012
+    _levels = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """Read a node, which may hold others, but not without end."""
+        self._levels += 1
+        if self._levels > MOST_LEVELS:
+            line = self.peek_event().start_mark.line + 1  # type: ignore[no-untyped-call]
+            raise DocumentError(line, f"has more than {MOST_LEVELS} tables or lists within one another")
+        node: yaml.Node | None = super().compose_node(parent, index)
+        self._levels -= 1
+        return node
 
 
 for _tag, _pattern, _first in (
@@ -117,7 +132,7 @@ class _Reader:
             line = key_node.start_mark.line + 1
             if not isinstance(key_node, yaml.ScalarNode):
                 raise DocumentError(line, "a name of a field must be a text")
-            key = key_node.value
+            key = _text(key_node.value, line)
             place = (*path, key)
             if key in table:
                 raise DocumentError(line, f"the field '{key}' stands twice, first on line {self.lines[place]}")
@@ -131,13 +146,27 @@ class _Reader:
     def _scalar(node: yaml.ScalarNode, line: int) -> Any:
         kind, value = node.tag.removeprefix(_CORE), node.value
         if kind == "str":
-            return value
+            return _text(value, line)
         if kind == "null":
             return None
-        if kind == "bool":
-            return _WORDS[value.lower()]
-        if kind == "int":
-            return int(value)
-        if kind == "float":
-            return float(re.sub(r"\.(?=[inIN])", "", value))
+        if kind == "int" and len(value) > MOST_DIGITS:
+            raise DocumentError(line, f"a whole number of {len(value)} digits is too large; at most {MOST_DIGITS}")
+        try:
+            if kind == "bool":
+                return _WORDS[value.lower()]
+            if kind == "int":
+                return int(value)
+            if kind == "float":
+                return float(re.sub(r"\.(?=[inIN])", "", value))
+        except (KeyError, ValueError):
+            raise DocumentError(line, f"the tag {node.tag} does not fit {value!r:.60}; leave it out") from None
         raise DocumentError(line, f"the tag {node.tag} is not allowed: write plain numbers and texts")
+
+
+def _text(value: str, line: int) -> str:
+    """A text that can be written to a file again; an escape may name half of a letter."""
+    try:
+        value.encode("utf-8")
+    except UnicodeEncodeError:
+        raise DocumentError(line, f"{value!r:.60} holds an escape that is no letter; correct it") from None
+    return value

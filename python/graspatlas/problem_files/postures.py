@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import csv
+import io
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from graspatlas.archives import DamagedArchive, read_arrays
 from graspatlas.errors import GraspAtlasError
+from graspatlas.files import opened, read_text
 
 __all__ = ["read_postures"]
 
@@ -31,11 +34,12 @@ def read_postures(path: Path, name: str | None = None) -> tuple[NDArray[np.float
     try:
         return _read_npz(path, label) if path.suffix == ".npz" else _read_csv(path, label)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise GraspAtlasError(f"cannot read postures '{label}': {error}") from None
+        reason = getattr(error, "strerror", None) or error
+        raise GraspAtlasError(f"cannot read postures '{label}': {reason}") from None
 
 
 def _read_csv(path: Path, label: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    with path.open(newline="", encoding="utf-8-sig") as file:
+    with io.StringIO(read_text(path, "utf-8-sig"), newline="") as file:
         reader = csv.reader(file)
         names = tuple(name.strip() for name in next(reader, []))
         if not any(names):
@@ -62,8 +66,11 @@ def _number(text: str, label: str, line: int, joint: str) -> float:
 
 def _read_npz(path: Path, label: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     try:
-        with np.load(path, allow_pickle=False) as file:
-            return np.array(file["samples"], float), tuple(map(str, file["joints"]))
-    except (KeyError, ValueError, TypeError, AttributeError) as error:
+        with opened(path, "postures") as stream:
+            arrays = read_arrays(stream)
+        return np.array(arrays["samples"], float), tuple(map(str, arrays["joints"]))
+    except GraspAtlasError:
+        raise
+    except (DamagedArchive, KeyError, ValueError, TypeError) as error:
         reason = " ".join(str(error).split())
         raise GraspAtlasError(f"'{label}' needs the arrays samples [z, h] and joints [h]: {reason}") from None

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from graspatlas.errors import GraspAtlasError
+from graspatlas.files import is_file
 from graspatlas.hand import Hand
 from graspatlas.patches import patch_types
 from graspatlas.problem_files.reading import FILL_IN
@@ -121,7 +122,7 @@ def _hand(urdf: str, folder: Path | None) -> tuple[Hand, str]:
     if kind == "robot_descriptions" and name:
         path, folders = described_robot(name)
         return Hand.from_urdf(path, name=name, package_paths=folders), f"robot_descriptions: {name}"
-    if not Path(urdf).is_file():
+    if not is_file(urdf):
         raise GraspAtlasError(
             f"file '{urdf}' does not exist; give a URDF, example_robot_data:NAME or robot_descriptions:NAME"
         )

@@ -6,6 +6,7 @@ from importlib import resources
 from pathlib import Path
 
 from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.files import is_file, read_text
 from graspatlas.problem import Problem
 from graspatlas.robot_files import robots_folder
 
@@ -48,10 +49,10 @@ def problem_text(name: str | Path) -> tuple[str, str, Path]:
         text = (resources.files("graspatlas.problems") / f"{name}.yaml").read_text(encoding="utf-8")
         return text, f"{name}.yaml", robots_folder()
     path = Path(name)
-    if path.suffix not in ENDINGS and not path.is_file():
+    if path.suffix not in ENDINGS and not is_file(path):
         raise unknown_name("problem", name, bundled_problems())
     try:
-        return path.read_text(encoding="utf-8"), str(name), path.parent
-    except (OSError, UnicodeDecodeError) as error:
+        return read_text(path), str(name), path.parent
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise GraspAtlasError(f"cannot read problem file '{path}': {reason}; correct the path") from None

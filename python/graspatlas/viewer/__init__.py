@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 __all__ = ["export_html", "save_picture", "view"]
 
 
-def view(shown: Result | Path, *, open_browser: bool = True, wait: bool = True) -> meshcat.Visualizer:
+def view(
+    shown: Result | Path, *, open_browser: bool = True, wait: bool = True, host: str = "127.0.0.1"
+) -> meshcat.Visualizer:
     """Show the best and the worst grasp of a result side by side in a browser; or a path, as a film.
 
     The page's address is printed to standard error. Meshcat's controls, top right, play a film and have its slider.
@@ -27,16 +29,18 @@ def view(shown: Result | Path, *, open_browser: bool = True, wait: bool = True) 
         shown: The result, or a path of grasps.
         open_browser: Whether to open the page in the browser.
         wait: Whether to serve the page until Ctrl-C is pressed; otherwise it is served until the program ends.
+        host: Address on which the page is served. By default only programs of this machine reach it; with
+            ``"0.0.0.0"`` everyone who reaches the machine does, and nobody is asked for a password.
 
     Returns:
-        Meshcat's visualizer, to add things to; its server has ended if `wait`.
+        Meshcat's visualizer, to add things to; its server, a thread of this program, has ended if `wait`.
 
     Raises:
-        GraspAtlasError: If a mesh cannot be read, or meshcat's server does not start.
+        GraspAtlasError: If a mesh cannot be read, or the page cannot be served on this address.
     """
     from graspatlas.viewer.live import show
 
-    return show(_checked(shown), open_browser=open_browser, wait=wait)
+    return show(_checked(shown), open_browser=open_browser, wait=wait, host=host)
 
 
 def export_html(shown: Result | Path, path: str | os.PathLike[str]) -> None:

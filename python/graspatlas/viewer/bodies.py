@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand import Body
+from graspatlas.mesh_files import check_meshes
 from graspatlas.problem import Problem
 from graspatlas.viewer.meshes import Mesh, from_coal
 from graspatlas.viewer.sketch import Shape, bones, outlines
@@ -51,6 +52,7 @@ class BodyShapes:
         """Pinocchio's model and geometry, and the meshes; collision shapes where a body has no visual ones."""
         import pinocchio as pin
 
+        check_meshes(body)
         try:
             model = pin.buildModelFromXML(body.tree)
             for kind in (pin.VISUAL, pin.COLLISION):

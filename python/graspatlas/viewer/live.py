@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import signal
 import sys
 import threading
 import time
-import warnings
 from typing import TYPE_CHECKING, Any
 
-from graspatlas.errors import GraspAtlasError
 from graspatlas.paths import Path
 from graspatlas.result import Result
+from graspatlas.terminal import say
 from graspatlas.viewer.film import Film
 from graspatlas.viewer.film_page import film_animation, film_caption, film_commands
 from graspatlas.viewer.page import commands
@@ -25,18 +22,18 @@ if TYPE_CHECKING:
 __all__ = ["close", "show"]
 
 
-def show(shown: Result | Path, *, open_browser: bool, wait: bool) -> meshcat.Visualizer:
+def show(shown: Result | Path, *, open_browser: bool, wait: bool, host: str) -> meshcat.Visualizer:
     """Serve a result's scene, or a path's film; see :func:`graspatlas.viewer.view`."""
     if isinstance(shown, Path):
         film = Film(shown)
         name, told = film.path.result.problem.name, [*film_commands(film), film_caption(film), film_animation(film)]
     else:
         name, told = shown.problem.name, list(commands(Scene(shown), with_legend=True))
-    visualizer = _start()
+    visualizer = _start(host)
     try:
         for command in told:
             visualizer.window.send(_Command(command))
-        print(f"{name} at {visualizer.url()}", file=sys.stderr)
+        say(f"{name} at {visualizer.url()}", file=sys.stderr)
         if open_browser:
             visualizer.open()
         if wait:
@@ -50,13 +47,7 @@ def show(shown: Result | Path, *, open_browser: bool, wait: bool) -> meshcat.Vis
 
 def close(visualizer: meshcat.Visualizer) -> None:
     """End the server of a visualizer, and what listens to it."""
-    window = visualizer.window
-    window.zmq_socket.close(linger=0)
-    process = window.server_proc
-    process.terminate()
-    process.wait()
-    process.stdout.close()
-    process.stderr.close()
+    visualizer.window.close()
 
 
 class _Command:
@@ -69,18 +60,10 @@ class _Command:
         return self._content
 
 
-def _start() -> meshcat.Visualizer:
-    with warnings.catch_warnings():  # meshcat imports a deprecated part of pyzmq
-        warnings.simplefilter("ignore", DeprecationWarning)
-        import meshcat
+def _start(host: str) -> meshcat.Visualizer:
+    from graspatlas.viewer.server import Server, Visualizer, Window  # slow to import
 
-    try:
-        with contextlib.redirect_stdout(io.StringIO()):
-            return meshcat.Visualizer()
-    except (RuntimeError, OSError) as error:
-        raise GraspAtlasError(
-            f"meshcat's server does not start: {error}; export_html writes a page that needs no server"
-        ) from None
+    return Visualizer(window=Window(Server(host)))
 
 
 def _end_with_us() -> None:
@@ -90,6 +73,6 @@ def _end_with_us() -> None:
 
 
 def _serve(visualizer: meshcat.Visualizer) -> None:
-    while visualizer.window.server_proc.poll() is None:
+    while visualizer.window.server.running:
         time.sleep(0.2)
     close(visualizer)
