@@ -216,6 +216,7 @@ void bind_atlas(py::module_& module) {
       .def_property_readonly("complete", &Atlas::complete, "True when no chart is left to expand.")
       .def_property_readonly("n_open", &Atlas::open_count, "Charts still to be expanded.")
       .def_property_readonly("n_charts", &Atlas::count, "Charts so far.")
+      .def_property_readonly("n_settled", &Atlas::settled_count, "Charts, the first ones, whose numbers stay.")
       .def_property_readonly("n_threads", &Atlas::threads, "Threads that it uses.")
       .def_property_readonly("n_bytes", &Atlas::bytes, "Memory that it holds.")
       .def_property_readonly("n_array_bytes", &Atlas::array_bytes, "Memory that its arrays would take, at most.")

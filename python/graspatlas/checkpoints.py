@@ -21,12 +21,12 @@ __all__ = ["CheckpointFolder", "run_digest"]
 
 #: Changes when a checkpoint of an older version would not lead to the same atlas.
 VERSION = 3
-#: Arrays of which each file of a checkpoint holds the part that came after the file before it.
+#: Arrays of which each file of a checkpoint holds the part from its first chart on.
 _GROWING = ("centers", "bases", "residuals", "regularities", "keys")
 #: What each array of a checkpoint may hold: floating-point numbers, whole ones.
 _KINDS = {
     **dict.fromkeys(("centers", "bases", "residuals", "regularities", "closed_vertices"), "f"),
-    **dict.fromkeys(("keys", "closed_charts", "closed_reasons", "generation", "again", "paused", "counts"), "iu"),
+    **dict.fromkeys(("keys", "closed_charts", "closed_reasons", "generation", "again", "paused", "counts", "first"), "iu"),
 }
 #: A step away from x0 at which the system is looked at, to tell it from others [units of the tangent space].
 _STEP = 1e-3
@@ -44,9 +44,9 @@ def run_digest(system: AnySystem, x0: NDArray[np.float64], radius: float, epsilo
 
 
 class CheckpointFolder:
-    """A folder of numbered files: each holds the charts that came after those of the file before it.
+    """A folder of numbered files: each holds the charts from the first on whose number was not settled before.
 
-    So a long run writes each chart once. A file is written beside its place and renamed, and what it says of the state
+    So a long run writes nearly all charts once. A file is written beside its place and renamed, and what it says of the state
     of the run replaces what older files say; a file that a killed run left unfinished is not there.
 
     Args:
@@ -69,9 +69,23 @@ class CheckpointFolder:
         parts = [self._read(path) for path in paths]
         if not parts:
             return None
-        out = {**parts[-1], **{name: np.concatenate([part[name].ravel() for part in parts]) for name in _GROWING}}
-        self._n_files, self._n_charts = len(parts), len(out["keys"])
+        out = {name: part for name, part in parts[-1].items() if name != "first"}
+        try:
+            out |= {name: self._joined(name, parts) for name in _GROWING}
+        except ValueError:
+            raise GraspAtlasError(
+                f"the files of '{self.folder}' do not fit together; delete it to begin anew"
+            ) from None
+        self._n_files, self._n_charts = len(parts), int(parts[-1]["first"])
         return out
+
+    def _joined(self, name: str, parts: list[dict[str, Any]]) -> NDArray[Any]:
+        """An array of all charts [flat]: each file says anew what older ones say from its first chart on."""
+        whole: NDArray[Any] = parts[0][name].reshape(len(parts[0]["keys"]), -1)
+        for part in parts[1:]:
+            added = part[name].reshape(len(part["keys"]), whole.shape[1]) if part["keys"].size else whole[:0]
+            whole = np.concatenate([whole[: int(part["first"])], added])
+        return whole.ravel()
 
     def _read(self, path: Path) -> dict[str, Any]:
         try:
@@ -105,9 +119,9 @@ class CheckpointFolder:
             raise GraspAtlasError(f"cannot make folder '{self.folder}': {error.strerror or error}") from None
         with replaced(self.folder / f"{self._n_files:06}.npz") as stream:
             part: dict[str, Any] = dict(builder.save(self._n_charts))
-            np.savez(stream, digest=self.digest, **part)
+            np.savez(stream, digest=self.digest, first=self._n_charts, **part)
         self._n_files += 1
-        self._n_charts = builder.n_charts
+        self._n_charts = builder.n_settled
 
     @staticmethod
     def remove(folder: Path) -> None:

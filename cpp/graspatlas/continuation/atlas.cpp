@@ -218,6 +218,8 @@ void Atlas::finish_task(Worker& worker, Task& task, int made, bool done) {
   again_.insert(again_.end(), reopened.begin(), reopened.end());
   reopened.clear();
   free_place(task);
+  // What waited for a task that is paused must not begin.
+  if (!done && made < kMostCharts) stop();
 }
 
 // A task that goes on in a later call, before all that come after it.
@@ -285,13 +287,21 @@ void Atlas::choose_order(Worker& worker) {
     for (int turn = first; turn < count; turn += length) turns_.push_back(turn);
 }
 
-// Numbers the charts that have come; no task may be running.
+// Numbers the charts that have come; no task may be running. While tasks are paused, charts that come after theirs may
+// get other numbers later.
 void Atlas::settle_order() {
-  const auto first = static_cast<std::ptrdiff_t>(order_.size());
-  for (int slot = static_cast<int>(first); slot < charts_.count(); ++slot) order_.push_back(slot);
-  std::sort(order_.begin() + first, order_.end(), [this](int a, int b) { return charts_[a].key < charts_[b].key; });
-  for (std::size_t i = static_cast<std::size_t>(first); i < order_.size(); ++i)
+  for (int slot = static_cast<int>(order_.size()); slot < charts_.count(); ++slot) order_.push_back(slot);
+  const auto by_key = [this](int a, int b) { return charts_[a].key < charts_[b].key; };
+  std::sort(order_.begin() + settled_, order_.end(), by_key);
+  for (std::size_t i = static_cast<std::size_t>(settled_); i < order_.size(); ++i)
     charts_[order_[i]].number = static_cast<int>(i);
+  if (paused_.empty()) {
+    settled_ = static_cast<std::ptrdiff_t>(order_.size());
+    return;
+  }
+  const auto next = static_cast<ChartKey>(paused_.front().number) * kMostCharts;
+  const auto before = [this](int slot, ChartKey key) { return charts_[slot].key < key; };
+  settled_ = std::lower_bound(order_.begin(), order_.end(), next, before) - order_.begin();
 }
 
 }  // namespace graspatlas

@@ -51,6 +51,8 @@ class Atlas {
   /// Charts that were not expanded yet.
   std::int64_t open_count() const;
   std::int64_t count() const { return static_cast<std::int64_t>(order_.size()); }
+  /// Charts, the first ones, whose numbers stay: of those after them some may get others when tasks go on.
+  std::int64_t settled_count() const { return settled_; }
   int threads() const { return static_cast<int>(workers_.size()); }
 
   /// Look, for so many seconds, for points of the manifold that a complete atlas does not cover: by at least so many
@@ -135,7 +137,8 @@ class Atlas {
   AtlasOptions options_;
   Charts charts_;
   std::vector<std::unique_ptr<Worker>> workers_;
-  std::vector<int> order_;  // slots in the order of the algorithm
+  std::vector<int> order_;      // slots in the order of the algorithm
+  std::ptrdiff_t settled_ = 0;  // charts of it whose numbers stay
 
   std::vector<int> generation_, turns_;  // slots of the charts to expand, and the order to take them in
   std::vector<double> embeddings_;       // of the charts of the generation

@@ -127,6 +127,7 @@ void Atlas::restore(const Checkpoint& saved) {
   // Which charts lose rank is not kept: the last round is made again.
   audit_ = saved.audit;
   audit_.done = false;
+  settle_order();  // by the tasks that are paused
   for (const PausedTask& task : paused_) charts_[generation_[static_cast<std::size_t>(task.turn)]].done = false;
   for (std::size_t turn = position_; turn < turns_.size(); ++turn) charts_[generation_[turns_[turn]]].done = false;
   for (std::size_t i = next_first_; i < order_.size(); ++i) charts_[order_[i]].done = false;

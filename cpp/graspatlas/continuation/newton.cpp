@@ -61,8 +61,7 @@ double distance_to_zero(const double* R, const double* J, int equations, int n, 
   for (int e = 0; e < equations; ++e) {
     row_sizes[e] = largest_entry(J + static_cast<std::ptrdiff_t>(e) * n, n);
     const double off = R[e] == 0.0 ? 0.0 : std::abs(R[e]) / row_sizes[e];
-    if (!std::isfinite(off)) return HUGE_VAL;
-    distance = std::max(distance, off);
+    distance = std::isfinite(off) ? std::max(distance, off) : HUGE_VAL;
   }
   return distance;
 }
@@ -198,11 +197,12 @@ Projection Newton::project_freely(double* x, double* Phi) {
   }
   for (int iteration = 0; iteration <= options_.max_iterations; ++iteration) {
     const double distance = linearize(x);
+    const bool flat = std::any_of(row_sizes_.begin(), row_sizes_.end(), [](double size) { return size == 0.0; });
+    if (std::isfinite(residual_) && flat) return Projection::singular;
     if (!std::isfinite(distance)) return Projection::not_converged;
     Eigen::Map<RowMatrix> J(J_.data(), equations, n);
     if (!J.allFinite()) return Projection::not_converged;
     for (int e = 0; e < equations; ++e) {
-      if (!(row_sizes_[e] > 0.0)) return Projection::singular;
       J.row(e) /= row_sizes_[e];
       R_[e] /= row_sizes_[e];
     }
