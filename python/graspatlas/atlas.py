@@ -17,7 +17,7 @@ from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.projection import checked_point
 from graspatlas.systems import AnySystem
-from graspatlas.tables import number_array
+from graspatlas.tables import number_array, read_only
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -66,7 +66,8 @@ class Atlas:
     """Charts that cover the part of a manifold connected to a first point.
 
     Chart i covers the points above the polytope ``{u : facet_normals u <= facet_offsets}`` of its tangent space; facets
-    and vertices of all charts are stored one after another, chart i has rows ``start[i]`` to ``start[i + 1]``.
+    and vertices of all charts are stored one after another, chart i has rows ``start[i]`` to ``start[i + 1]``. The arrays
+    cannot be written to: copy what you want to change.
 
     Attributes:
         system: The system R(x) = 0.
@@ -97,6 +98,11 @@ class Atlas:
     vertices: Array
     vertex_closed: NDArray[np.uint8]
     neighbour_pairs: NDArray[np.int32]
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            if isinstance(array := getattr(self, f.name), np.ndarray):
+                object.__setattr__(self, f.name, read_only(array))
 
     def check_arrays(self) -> None:
         """Make sure that the arrays fit together, for an atlas that was read from a file.
