@@ -66,8 +66,8 @@ class Atlas:
     """Charts that cover the part of a manifold connected to a first point.
 
     Chart i covers the points above the polytope ``{u : facet_normals u <= facet_offsets}`` of its tangent space; facets
-    and vertices of all charts are stored one after another, chart i has rows ``start[i]`` to ``start[i + 1]``. The arrays
-    cannot be written to: copy what you want to change.
+    and vertices of all charts are stored one after another, chart i has rows ``start[i]`` to ``start[i + 1]``. The
+    arrays cannot be written to: copy what you want to change.
 
     Attributes:
         system: The system R(x) = 0.

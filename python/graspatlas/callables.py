@@ -74,7 +74,7 @@ def _called(function: Callable[[Any], Any], who: str, what: str, kinds: str, gra
     if is_batched(function):
         with _named(who, ""):
             returned = function(grasps)
-        return _checked(returned, (n,), f"{who} must return {n} {what}s for {n} grasps, {what}s in an array [{n}]", kinds)
+        return _checked(returned, (n,), f"{who} must return an array of {n} {what}s for {n} grasps", kinds)
     values = []
     for i, grasp in enumerate(grasps):
         place = _place(grasps, i)
@@ -99,7 +99,7 @@ def _checked(returned: Any, shape: tuple[int, ...], rule: str, kinds: str, place
     """What came as an array of this shape, if it is made of numbers or flags."""
     try:
         array = np.asarray(returned)
-        masked = np.ma.isMaskedArray(returned) and bool(np.ma.getmaskarray(returned).any())
+        masked = _has_masked(returned)
     except Exception:  # objects convert themselves as they like
         raise GraspAtlasError(f"{rule}; it returned {_shown(returned)}{place}") from None
     hint = ""
@@ -116,6 +116,13 @@ def _checked(returned: Any, shape: tuple[int, ...], rule: str, kinds: str, place
         if not shape:
             hint += "; one that takes all grasps at once is marked with graspatlas.batched"
     raise GraspAtlasError(f"{rule}; it returned {_shown(returned)}{place}{hint}")
+
+
+def _has_masked(returned: Any) -> bool:
+    """True for a masked array with a masked entry, and for a list of such: as plain arrays they have numbers there."""
+    if isinstance(returned, list | tuple):
+        return any(_has_masked(item) for item in returned if not isinstance(item, float))
+    return bool(np.ma.is_masked(returned)) if np.ma.isMaskedArray(returned) else False
 
 
 def _shown(value: Any) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from dataclasses import fields
@@ -21,6 +22,7 @@ from graspatlas.components import Components, SearchStatus, find_components
 from graspatlas.errors import GraspAtlasError
 from graspatlas.exit_status import FAILED, INTERRUPTED, MISUSE
 from graspatlas.files import writable_folder
+from graspatlas.interrupts import stoppable, stopped_by
 from graspatlas.optimizer import optimize
 from graspatlas.problem_commands import add_problem_commands
 from graspatlas.problems import bundled_problems, load_problem
@@ -31,6 +33,9 @@ from graspatlas.result_commands import add_result_commands
 
 __all__ = ["main"]
 
+#: Requests to end, besides Ctrl-C: of a cluster whose time is up, and of a terminal that is closed.
+_REQUESTS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
@@ -40,20 +45,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns:
         Exit status: 0, 1 where no grasp meets the requirements or a check fails, 2 for wrong input, 130 when
-        interrupted.
+        interrupted, 143 when terminated: a request to terminate keeps what there is, as Ctrl-C does.
     """
     options = _parser().parse_args(arguments)
     try:
-        return int(options.run(options))
+        with stoppable(also=_REQUESTS):
+            status = int(options.run(options))
+            return 128 + stopped_by() if status == INTERRUPTED and stopped_by() else status
     except GraspAtlasError as error:
         print(f"graspatlas: error: {error}", file=sys.stderr)
         return MISUSE
     except BrokenPipeError:  # the reader of our output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         print("graspatlas: interrupted", file=sys.stderr)
-        return INTERRUPTED
+        return 128 + int(getattr(error, "signal", signal.SIGINT))
 
 
 class _Parser(argparse.ArgumentParser):

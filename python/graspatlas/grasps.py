@@ -136,8 +136,8 @@ class Grasp:
 class Grasps:
     """A batch of n grasps of one problem; everything is computed once, in the compiled core, when first asked for.
 
-    Its attributes are those of :class:`Grasp` with a leading axis of length n. Its arrays cannot be written to: they are
-    shared, ``x`` with what it was made of, often the centres of an atlas.
+    Its attributes are those of :class:`Grasp` with a leading axis of length n. Its arrays cannot be written to: they
+    are shared, ``x`` with what it was made of, often the centres of an atlas.
 
     Args:
         problem: The problem.

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graspatlas.errors import GraspAtlasError, unknown_name
-from graspatlas.tables import read_only
 from graspatlas.motions import HandMotions
+from graspatlas.tables import read_only
 
 __all__ = ["Mechanism", "Mimic", "read_mimics"]
 

@@ -32,6 +32,7 @@ __all__ = [
     "JointMargin",
     "Require",
     "Requirement",
+    "check_requirements",
     "parse_requirement",
     "requirement_from_dict",
     "requirement_name",
@@ -259,6 +260,21 @@ def requirement_from_dict(data: Mapping[str, Any]) -> Requirement:
     return REQUIREMENTS[name](**checked_table(values or {}, f"requirement {name}", (), attributes))
 
 
+def check_requirements(requirements: Sequence[Require]) -> None:
+    """Make sure that requirements are a list or tuple of named ones and functions.
+
+    Raises:
+        GraspAtlasError: If they are not.
+    """
+    checked_instance(requirements, (list, tuple), "require")
+    for requirement in requirements:
+        if not isinstance(requirement, Requirement) and not callable(requirement):
+            raise GraspAtlasError(
+                f"a requirement is one of {', '.join(REQUIREMENTS)} or a function of a grasp, not "
+                f"{shown(requirement)}; requirements.parse_requirement reads text"
+            )
+
+
 def screen(requirements: Sequence[Require], grasps: Grasps) -> tuple[Flags, dict[str, int]]:
     """Which grasps meet all requirements, the cheapest asked first and only of those that are left.
 
@@ -272,13 +288,7 @@ def screen(requirements: Sequence[Require], grasps: Grasps) -> tuple[Flags, dict
     Raises:
         GraspAtlasError: If a function raises or returns anything but True and False; see :mod:`graspatlas.callables`.
     """
-    checked_instance(requirements, (list, tuple), "require")
-    for requirement in requirements:
-        if not isinstance(requirement, Requirement) and not callable(requirement):
-            raise GraspAtlasError(
-                f"a requirement is one of {', '.join(REQUIREMENTS)} or a function of a grasp, not "
-                f"{shown(requirement)}; requirements.parse_requirement reads text"
-            )
+    check_requirements(requirements)
     left = np.arange(len(grasps))
     refused: dict[str, int] = {}
     for requirement in sorted(requirements, key=lambda r: r.cost if isinstance(r, Requirement) else 1):

@@ -115,7 +115,7 @@ def number_array(value: ArrayLike, what: str) -> NDArray[np.float64]:
 
 def read_only(array: NDArray[T]) -> NDArray[T]:
     """The same numbers, without a copy, as an array that cannot be written to; the one given can, if it could."""
-    view = array.view()
+    view: NDArray[T] = array.view()
     view.flags.writeable = False
     return view
 
