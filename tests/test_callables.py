@@ -41,7 +41,7 @@ NO_NUMBERS = {
     "ragged": ([1.0, [2.0]], r"\[1.0, \[2.0\]\]"),
     "dictionary": ({"quality": 1.0}, "quality"),
     "date": (np.datetime64("2026-01-01"), "2026"),
-    "huge": (10**400, "object"),
+    "huge": (10**400, "1000"),
 }
 
 
@@ -105,9 +105,7 @@ def test_masked_flags_are_refused(planar: ga.Result) -> None:
     with pytest.raises(ga.GraspAtlasError, match="masked"):
         screen([ga.batched(lambda grasps: masked)], batch_of(planar, [3, 8, 5]))
     with pytest.raises(ga.GraspAtlasError, match="masked"):
-        evaluate(
-            ga.batched(lambda grasps: [1.0, np.ma.array([2.0, 3.0], mask=[1, 0])[0], 3.0]), batch_of(planar, [3, 8, 5])
-        )
+        evaluate(ga.batched(lambda grasps: [1.0, np.ma.masked, 3.0]), batch_of(planar, [3, 8, 5]))
 
 
 def test_charts_are_told_after_a_requirement_has_refused_some(planar: ga.Result) -> None:
@@ -151,11 +149,11 @@ def arrays_in(thing: Any, path: str, seen: set[int], depth: int = 5) -> list[tup
     return out
 
 
-@pytest.mark.parametrize("name", ["planar_hand", "three_finger_cup"])
-def test_a_function_that_writes_into_a_grasp_changes_nothing(name: str) -> None:
+@pytest.mark.parametrize(("name", "dimension"), [("planar_hand", 1), ("three_finger_cup", 3)])
+def test_a_function_that_writes_into_a_grasp_changes_nothing(name: str, dimension: int) -> None:
     """Neither the grasp of others, nor the problem, nor the result: every array is read-only, or a copy of its own."""
     problem = ga.load_problem(name)
-    options = {"dimension": 1, "radius": 0.5, "max_charts": 20, "epsilon": 0.5, "quality": "joint_centrality"}
+    options = {"dimension": dimension, "radius": 0.5, "max_charts": 20, "epsilon": 0.5, "quality": "joint_centrality"}
     result = ga.optimize(problem, **options, require=())  # type: ignore[arg-type]
     known = {key: array.copy() for key, array in result.atlas.to_arrays().items()}
 
@@ -252,7 +250,7 @@ def test_an_error_after_the_atlas_carries_it(planar: ga.Result, where: str) -> N
         "second index": {"quality": ["joint_centrality", index], "require": ()},
         "batch": {"quality": batch, "require": ()},
     }[where]
-    with pytest.raises(ga.GraspAtlasError, match="'(index|requirement|batch)'") as caught:
+    with pytest.raises(ga.GraspAtlasError, match=r"'(index|requirement|batch)'") as caught:
         ga.optimize(planar.problem, **wrong)
     atlas = caught.value.atlas  # type: ignore[attr-defined]
     assert (atlas.centers == planar.atlas.centers).all()
