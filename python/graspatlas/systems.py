@@ -22,7 +22,17 @@ from graspatlas._core import Angles, AnySystem, PythonSystem, Rotations, Sphere,
 from graspatlas.errors import GraspAtlasError
 from graspatlas.tables import number_array
 
-__all__ = ["Angles", "AnySystem", "Rotations", "Sphere", "System", "Torus", "check_finite", "check_jacobian", "jacobian_error"]
+__all__ = [
+    "Angles",
+    "AnySystem",
+    "Rotations",
+    "Sphere",
+    "System",
+    "Torus",
+    "check_finite",
+    "check_jacobian",
+    "jacobian_error",
+]
 
 Array = NDArray[np.float64]
 
