@@ -37,7 +37,7 @@ void check_wrenches(const DoubleArray& wrenches) {
 }
 
 constexpr std::chrono::milliseconds kBetweenSignals{50};  // so that Ctrl-C is heard
-constexpr py::ssize_t kRowsForThreads = 256;     // fewer rows are done before other threads have started
+constexpr py::ssize_t kRowsForThreads = 256;              // fewer rows are done before other threads have started
 
 /// evaluate(row) for n rows, without the GIL, on all cores. Each worker has what `make(worker)` returns.
 template <class Make>
