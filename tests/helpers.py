@@ -140,16 +140,6 @@ def random_rotation(rng: np.random.Generator) -> Array:
     return np.asarray(q / np.linalg.norm(q))
 
 
-def unless_refused(make: Callable[[], Any]) -> Any:
-    """What is made, or None when its radius is refused."""
-    try:
-        return make()
-    except ga.GraspAtlasError as error:
-        if "radius" not in str(error):
-            raise
-        return None
-
-
 def margin_by_linear_programming(grasp: ga.Grasp, friction: float, faces: int = 240) -> float:
     """The force-closure margin with every cone replaced by a pyramid round it: a little larger than it."""
     m = len(grasp.contact_points)

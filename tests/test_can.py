@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers import unless_refused
 from scipy.spatial import cKDTree
 
 import graspatlas as ga
@@ -101,9 +100,21 @@ def test_results_are_the_same_to_the_bit(can, can_result):
 
 
 @pytest.mark.parametrize("name", ["schunk_can", "schunk_oil_bottle"])
-@pytest.mark.parametrize("radius", [10.0, 100.0, 1e6])
-def test_a_radius_beyond_the_manifold_is_never_called_global(name, radius):
-    """One chart as large as the bounds, with corners far from the manifold, covers nothing: refused or reported."""
-    problem = ga.load_problem(name)
-    result = unless_refused(lambda: ga.optimize(problem, dimension=2, radius=radius, epsilon=0.5, max_seconds=1.0))
-    assert result is None or not result.is_global
+@pytest.mark.parametrize("radius", [1.6, 10.0, 1e6])
+def test_a_radius_beyond_the_manifold_is_refused(name, radius):
+    with pytest.raises(ga.GraspAtlasError, match=r"radius must be below 1\.57"):
+        ga.optimize(ga.load_problem(name), dimension=2, radius=radius, epsilon=0.5, max_seconds=1.0)
+
+
+@pytest.mark.parametrize(
+    ("fine", "radius"), [("can_result", 0.5), ("can_result", 1.0), ("can_result", 1.5), ("bottle_result", 1.5)]
+)
+def test_charts_as_large_as_the_manifold_are_called_global_only_where_they_cover_it(fine, radius, request):
+    """Two charts do, of the bottle; a hundred of the can do not, and it is the fine atlas that tells."""
+    fine = request.getfixturevalue(fine)
+    result = ga.optimize(fine.problem, dimension=2, radius=radius, epsilon=0.5)
+    found = [result.atlas.locate(x) for x in fine.atlas.centers[::7]]
+    covered = all(chart >= 0 and distance <= 0.5 * radius for chart, distance in found)
+    assert covered or not result.is_global
+    if radius == 0.5 or fine.problem.name == "schunk_oil_bottle":
+        assert result.is_global

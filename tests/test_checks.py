@@ -210,3 +210,16 @@ def test_check_result_on_the_command_line(bottle_result, tmp_path, capsys):
     assert main(["check-result", str(tmp_path)]) == 1
     assert "FAIL  largest residual" in capsys.readouterr().out
     assert main(["check-result", str(tmp_path / "nothing")]) == 2
+
+
+def test_centres_outside_their_bounds_are_found():
+    """The bounds are those of the system to check against."""
+    half, less = (PythonSphere(3, lower=[-np.inf, -np.inf, low]) for low in (0.0, 0.5))
+    atlas = ga.build_atlas(half, [0, 0, 1], radius=0.2, epsilon=0.2)
+    outside = {
+        system: next(check for check in check_atlas(atlas, system).checks if "outside its bounds" in check.claim)
+        for system in (half, less)
+    }
+    assert outside[half].passed
+    assert not outside[less].passed
+    assert outside[less].measured == pytest.approx(0.5 - atlas.centers[:, 2].min())

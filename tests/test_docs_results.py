@@ -37,6 +37,7 @@ def test_the_code_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: 
 def test_every_column_is_named(small_result: ga.Result) -> None:
     named = {name for name in small_result.to_pandas(volumes=True) if re.fullmatch(r"[a-z]+_?[a-z_]*", str(name))}
     known = {*small_result.problem.hand.joints, *ga.quality.INDICES}
+    assert len(named - known) > 5
     for name in named - known:
         assert f"`{name}`" in TEXT or re.match("palm_|object_", name), name
 
@@ -49,8 +50,3 @@ def test_the_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsy
         assert main(words[1:]) == 0, words
     assert {"grasps.json", "charts.parquet", "path.csv", "out"} == {file.name for file in tmp_path.iterdir()}
     assert {file.name for file in (tmp_path / "out").iterdir()} == {"result.npz", "summary.json"}
-
-
-def test_links_exist() -> None:
-    for target in re.findall(r"\]\(([^)#]+)\)", TEXT):
-        assert (PAGE.parent / target).exists(), target

@@ -137,6 +137,20 @@ def test_refusals_are_counted_cheapest_first() -> None:
     assert min((q - lower).min(), (upper - q).min()) >= 0.05
 
 
+@pytest.mark.parametrize("side", [0, 1], ids=["lower", "upper"])
+def test_the_joint_margin_is_kept_from_both_limits(can: ga.Result, side: int) -> None:
+    """Each joint alone a little nearer to one limit than it may be, then as far as it must be; by names and angles."""
+    hand = can.problem.hand
+    middle = {name: 0.5 * sum(limits) for name, limits in hand.limits_by_name.items()}
+    for name, limits in hand.limits_by_name.items():
+        for distance, meets in ((0.049, False), (0.051, True)):
+            x = can.problem.x1_array.copy()
+            joints = middle | {name: limits[side] + distance * (1 - 2 * side)}
+            x[: len(hand.joints)] = [joints[joint] for joint in hand.joints]
+            met = ga.JointMargin(0.05).met(ga.Grasps(can.problem, x))
+            assert met.tolist() == [meets], name
+
+
 def test_continuous_joints_have_no_limits_to_keep_from() -> None:
     result = ga.optimize(ga.load_problem("planar_hand"), require=[ga.JointMargin(0.5)])
     assert result.feasible.all()

@@ -70,7 +70,7 @@ class PythonSystem : public System, public py::trampoline_self_life_support {
   void call(const char* method, const double* x, const std::vector<py::ssize_t>& shape, double* out) {
     const py::function function = py::get_override(this, method);
     if (!function) throw Error(std::string("a System needs a method ") + method + "(x)");
-    const auto array = py::cast<DoubleArray>(function(py::array_t<double>(configuration_size(), x)));
+    const DoubleArray array = numbers(method, function(py::array_t<double>(configuration_size(), x)));
     bool fits = array.ndim() == static_cast<py::ssize_t>(shape.size());
     for (std::size_t i = 0; fits && i < shape.size(); ++i) fits = array.shape(static_cast<py::ssize_t>(i)) == shape[i];
     if (!fits)
@@ -78,6 +78,43 @@ class PythonSystem : public System, public py::trampoline_self_life_support {
                   py::str(py::cast(shape)).cast<std::string>() + "; it returned shape " +
                   py::str(array.attr("shape")).cast<std::string>());
     std::copy_n(array.data(), array.size(), out);
+  }
+
+  /// What a method returned as numbers; an Error that says what it was when that would lose a part or invent one.
+  static DoubleArray numbers(const char* method, const py::object& returned) {
+    if (Py_TYPE(returned.ptr()) == py::detail::npy_api::get().PyArray_Type_ && py::isinstance<DoubleArray>(returned))
+      return py::cast<DoubleArray>(returned);
+    const py::array array = py::array::ensure(returned);
+    const char kind = array ? array.dtype().kind() : 'O';
+    std::string hint;
+    if (kind == 'c')
+      hint = "; take the real part";
+    else if (is_masked(returned))
+      hint = " with masked entries; fill them";
+    else if (kind == 'b' || kind == 'i' || kind == 'u' || kind == 'f')
+      return py::cast<DoubleArray>(array);
+    else if (returned.is_none())
+      hint = "; a return statement may be missing";
+    throw Error(std::string(method) + "(x) must return real numbers; it returned " + kind_of(returned, kind) + hint);
+  }
+
+  /// What an object is, whose array is of this kind, in words.
+  static std::string kind_of(const py::object& object, char kind) {
+    if (kind == 'c') return "complex numbers";
+    if (kind == 'U' || kind == 'S') return "text";
+    if (object.is_none()) return "None";
+    return "something of type " + py::type::of(object).attr("__name__").cast<std::string>();
+  }
+
+  /// True for a masked array with a masked entry, and for a list of such: as plain arrays they would have numbers
+  /// there.
+  static bool is_masked(const py::object& object) {
+    if (py::isinstance<py::list>(object) || py::isinstance<py::tuple>(object)) {
+      for (const py::handle item : object)
+        if (!PyFloat_Check(item.ptr()) && is_masked(py::reinterpret_borrow<py::object>(item))) return true;
+      return false;
+    }
+    return py::isinstance<py::array>(object) && py::module_::import("numpy.ma").attr("is_masked")(object).cast<bool>();
   }
 
   std::vector<Bound> bounds_;

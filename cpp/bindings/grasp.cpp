@@ -68,6 +68,8 @@ py::ssize_t checked_rows(const GraspSystem& system, const DoubleArray& X) {
   return X.shape(0);
 }
 
+constexpr py::ssize_t kGraspsBetweenSignals = 1024;  // so that Ctrl-C is heard
+
 ArrayTable grasp_arrays(GraspSystem& shared, const DoubleArray& X) {
   const Lease own(shared);
   GraspSystem& system = *own;
@@ -80,6 +82,8 @@ ArrayTable grasp_arrays(GraspSystem& shared, const DoubleArray& X) {
   RowMatrix J_one(3 * m, drives), Gt_one(3 * m, dof);
   using Map3 = Eigen::Map<Eigen::Vector3d>;
   for (py::ssize_t i = 0; i < n; ++i) {
+    if (i % kGraspsBetweenSignals == kGraspsBetweenSignals - 1 && PyErr_CheckSignals() != 0)
+      throw py::error_already_set();
     const double* x = X.data(i, 0);
     system.contact_points(x, contacts.data());
     for (py::ssize_t c = 0; c < m; ++c) {

@@ -1,4 +1,5 @@
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -36,8 +37,8 @@ void check_wrenches(const DoubleArray& wrenches) {
     if (!std::isfinite(wrenches.data()[i])) throw Error("wrenches must be finite numbers");
 }
 
-constexpr py::ssize_t kRowsBetweenSignals = 32;  // so that Ctrl-C is heard
-constexpr py::ssize_t kRowsForThreads = 256;     // fewer rows are done before other threads have started
+constexpr std::chrono::milliseconds kBetweenSignals{50};  // so that Ctrl-C is heard
+constexpr py::ssize_t kRowsForThreads = 256;              // fewer rows are done before other threads have started
 
 /// evaluate(row) for n rows, without the GIL, on all cores. Each worker has what `make(worker)` returns.
 template <class Make>
@@ -46,13 +47,15 @@ void for_rows(py::ssize_t n, const Make& make) {
   std::vector<decltype(make(0))> evaluate;
   for (int worker = 0; worker < threads; ++worker) evaluate.push_back(make(worker));
   std::atomic<bool> interrupted{false};
+  auto heard = std::chrono::steady_clock::now();  // by the first worker
   py::gil_scoped_release release;
   parallel_for(threads, n, [&](int worker, std::int64_t first, std::int64_t last) {
     for (std::int64_t row = first; row < last && !interrupted; ++row) {
       evaluate[static_cast<std::size_t>(worker)](row);
-      if (worker == 0 && row % kRowsBetweenSignals == kRowsBetweenSignals - 1) {
+      if (worker == 0 && std::chrono::steady_clock::now() - heard > kBetweenSignals) {
         py::gil_scoped_acquire acquire;
         if (PyErr_CheckSignals() != 0) interrupted = true;
+        heard = std::chrono::steady_clock::now();
       }
     }
   });

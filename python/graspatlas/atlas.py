@@ -18,7 +18,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.pickling import Light
 from graspatlas.projection import checked_point
 from graspatlas.systems import AnySystem
-from graspatlas.tables import number_array
+from graspatlas.tables import number_array, read_only
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -83,7 +83,7 @@ class Audit:
     seconds: float
 
     def share_missing(self, confidence: float = 0.95) -> float:
-        """Largest share of the manifold's points, as random walks come to them, that no chart covers, at this confidence.
+        """Largest share of the points that random walks come to that no chart covers, at this confidence.
 
         If more were missing, all points of the last round would have been covered with a chance below 1 - confidence. A
         part that no walk can come to, behind a passage much narrower than a chart, does not count.
@@ -101,7 +101,8 @@ class Atlas(Light):
     """Charts that cover the part of a manifold connected to a first point.
 
     Chart i covers the points above the polytope ``{u : facet_normals u <= facet_offsets}`` of its tangent space; facets
-    and vertices of all charts are stored one after another, chart i has rows ``start[i]`` to ``start[i + 1]``.
+    and vertices of all charts are stored one after another, chart i has rows ``start[i]`` to ``start[i + 1]``. The
+    arrays cannot be written to: copy what you want to change.
 
     Attributes:
         system: The system R(x) = 0.
@@ -139,6 +140,11 @@ class Atlas(Light):
     def __repr__(self) -> str:
         sizes = f"k = {self.dimension}, r = {self.radius:g}, epsilon = {self.epsilon:g}"
         return f"<Atlas of {self.n_charts} charts, {sizes}: {self.status}>"
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            if isinstance(array := getattr(self, f.name), np.ndarray):
+                object.__setattr__(self, f.name, read_only(array))
 
     def check_arrays(self) -> None:
         """Make sure that the arrays fit together, for an atlas that was read from a file.

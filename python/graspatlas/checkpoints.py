@@ -26,7 +26,8 @@ _GROWING = ("centers", "bases", "residuals", "regularities", "keys")
 #: What each array of a checkpoint may hold: floating-point numbers, whole ones.
 _KINDS = {
     **dict.fromkeys(("centers", "bases", "residuals", "regularities", "closed_vertices"), "f"),
-    **dict.fromkeys(("keys", "closed_charts", "closed_reasons", "generation", "again", "paused", "counts", "first"), "iu"),
+    **dict.fromkeys(("keys", "closed_charts", "closed_reasons", "generation", "again", "paused"), "iu"),
+    **dict.fromkeys(("counts", "first"), "iu"),
 }
 #: A step away from x0 at which the system is looked at, to tell it from others [units of the tangent space].
 _STEP = 1e-3
@@ -46,8 +47,8 @@ def run_digest(system: AnySystem, x0: NDArray[np.float64], radius: float, epsilo
 class CheckpointFolder:
     """A folder of numbered files: each holds the charts from the first on whose number was not settled before.
 
-    So a long run writes nearly all charts once. A file is written beside its place and renamed, and what it says of the state
-    of the run replaces what older files say; a file that a killed run left unfinished is not there.
+    So a long run writes nearly all charts once. A file is written beside its place and renamed, and what it says of the
+    state of the run replaces what older files say; a file that a killed run left unfinished is not there.
 
     Args:
         folder: The folder; made when the first file is written.

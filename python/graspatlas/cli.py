@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import sys
 from collections.abc import Sequence
 from dataclasses import fields
@@ -20,6 +21,7 @@ from graspatlas.components import Components, SearchStatus, find_components
 from graspatlas.errors import GraspAtlasError
 from graspatlas.exit_status import FAILED, INTERRUPTED, MISUSE
 from graspatlas.files import replaced, writable_folder
+from graspatlas.interrupts import stoppable, stopped_by
 from graspatlas.optimizer import optimize
 from graspatlas.problem_commands import add_problem_commands
 from graspatlas.problems import bundled_problems, load_problem
@@ -33,6 +35,9 @@ from graspatlas.words import path_word
 
 __all__ = ["main"]
 
+#: Requests to end, besides Ctrl-C: of a cluster whose time is up, and of a terminal that is closed.
+_REQUESTS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
@@ -42,21 +47,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns:
         Exit status: 0, 1 where no grasp meets the requirements or a check fails, 2 for wrong input, 130 when
-        interrupted.
+        interrupted, 143 when terminated: a request to terminate keeps what there is, as Ctrl-C does.
     """
     hear_interrupts()
     try:
-        status = _run(arguments)
-        finish_output()
-        return status
+        with stoppable(also=_REQUESTS):
+            status = _run(arguments)
+            finish_output()
+            return 128 + stopped_by() if status == INTERRUPTED and stopped_by() else status
     except GraspAtlasError as error:
         return _misuse(error)
     except BrokenPipeError:  # the reader of our output has seen enough
         silence_output()
         return 0
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         say("graspatlas: interrupted", file=sys.stderr)
-        return INTERRUPTED
+        return 128 + int(getattr(error, "signal", signal.SIGINT))
 
 
 def _run(arguments: Sequence[str] | None) -> int:

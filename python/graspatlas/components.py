@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from graspatlas.atlas import Atlas, Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasp
+from graspatlas.interrupts import stoppable
 from graspatlas.optimizer import optimize, options_of
 from graspatlas.problem import Problem
 from graspatlas.quality import Quality
@@ -128,6 +129,7 @@ class Components:
         }
 
 
+@stoppable()
 def find_components(
     problem: Problem,
     *,

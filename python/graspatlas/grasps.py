@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from graspatlas import _core
 from graspatlas.pickling import Light
-from graspatlas.tables import number_array
+from graspatlas.tables import number_array, read_only
 
 if TYPE_CHECKING:
     from graspatlas.problem import Problem
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Grasp:
-    """One grasp; m contacts, h joint velocities.
+    """One grasp; m contacts, h joint velocities. Its arrays cannot be written to: copy what you want to change.
 
     Attributes:
         x: The grasp as a point of the manifold [configuration_size].
@@ -142,21 +142,30 @@ class Grasp:
 class Grasps(Light):
     """A batch of n grasps of one problem; everything is computed once, in the compiled core, when first asked for.
 
-    Its attributes are those of :class:`Grasp` with a leading axis of length n.
+    Its attributes are those of :class:`Grasp` with a leading axis of length n. Its arrays cannot be written to: they
+    are shared, ``x`` with what it was made of, often the centres of an atlas.
 
     Args:
         problem: The problem.
         system: Its system; that of all feasible grasps by default.
         X: One grasp a row [n, configuration_size].
+        charts: Chart of each [n]; -1 for none, as by default.
     """
 
     #: Unit of the lengths in the object's velocity for `semi_axes` [m].
     LENGTH_UNIT = 1e-3
 
-    def __init__(self, problem: Problem, X: ArrayLike, system: _core.GraspSystem | None = None) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        X: ArrayLike,
+        system: _core.GraspSystem | None = None,
+        charts: ArrayLike | None = None,
+    ) -> None:
         self.problem = problem
         self.system = system if system is not None else problem.full_system
-        self.x = np.ascontiguousarray(np.atleast_2d(number_array(X, "X")))
+        self.x = read_only(np.ascontiguousarray(np.atleast_2d(number_array(X, "X"))))
+        self.charts = read_only(np.full(len(self.x), -1) if charts is None else np.asarray(charts, np.int64))
 
     def __repr__(self) -> str:
         return f"<Grasps: {len(self)} of {self.problem.name!r}>"
@@ -182,7 +191,7 @@ class Grasps(Light):
 
     @cached_property
     def _arrays(self) -> dict[str, Array]:
-        return dict(self.system.grasp_arrays(self.x))
+        return {name: read_only(array) for name, array in self.system.grasp_arrays(self.x).items()}
 
     @property
     def T_palm_object(self) -> Array:
@@ -270,10 +279,10 @@ class Grasps(Light):
     @cached_property
     def semi_axes(self) -> Array:
         """Ascending semi-axes of the manipulability ellipsoid [n, 6], lengths in millimetres."""
-        return np.asarray(_core.semi_axes(self.system, self.x, self.LENGTH_UNIT))
+        return read_only(np.asarray(_core.semi_axes(self.system, self.x, self.LENGTH_UNIT)))
 
     def __getitem__(self, i: int) -> Grasp:
-        one = Grasps(self.problem, self.x[i], self.system) if len(self) > 1 else self
+        one = Grasps(self.problem, self.x[i], self.system) if len(self) > 1 else self  # computed for this grasp alone
         return Grasp(
             x=one.x[0],
             q=one.q[0],
@@ -286,6 +295,7 @@ class Grasps(Light):
             G=one.G[0],
             semi_axes=one.semi_axes[0],
             problem=self.problem,
+            chart=int(self.charts[i]),
         )
 
     def __iter__(self) -> Iterator[Grasp]:

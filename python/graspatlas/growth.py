@@ -17,6 +17,7 @@ from graspatlas import _core
 from graspatlas.atlas import Status
 from graspatlas.checkpoints import CheckpointFolder
 from graspatlas.errors import GraspAtlasError
+from graspatlas.interrupts import hear, held, stopping
 from graspatlas.systems import AnySystem
 
 __all__ = ["Growth", "Limits", "available_bytes", "available_threads", "outlook"]
@@ -43,11 +44,13 @@ class Limits:
         charts: Number of charts.
         deadline: Time by ``time.perf_counter`` [s].
         memory: Of the atlas with the arrays made of it [bytes].
+        seconds_each: Time that is to be left for each chart at the deadline, to read it [s].
     """
 
     charts: int
     deadline: float
     memory: float
+    seconds_each: float = 0.0
 
 
 class Growth:
@@ -81,13 +84,16 @@ class Growth:
         def keep() -> None:
             nonlocal written
             if time.perf_counter() - written > _CHECKPOINT_SECONDS:
-                checkpoint.write(self.builder)
+                with held():
+                    checkpoint.write(self.builder)
                 written = time.perf_counter()
+                hear()
 
         start = written
         status = self._run(limits, progress, keep)
         if status is not Status.COMPLETE or written > start:
-            checkpoint.write(self.builder)
+            with held():
+                checkpoint.write(self.builder)
         return status
 
     def _run(self, limits: Limits, progress: bool | None, after_slice: Callable[[], None]) -> Status:
@@ -107,13 +113,16 @@ class Growth:
         try:
             while not builder.audited:
                 now = time.perf_counter()
-                if now >= limits.deadline:
+                left = limits.deadline - now - limits.seconds_each * builder.n_charts
+                if stopping():
+                    raise KeyboardInterrupt
+                if left <= 0.0:
                     return Status.TIME_LIMIT
                 if builder.n_charts >= limits.charts:
                     return Status.CHART_LIMIT
                 if builder.n_bytes + builder.n_array_bytes > limits.memory:
                     return Status.MEMORY_LIMIT
-                seconds = min(_SLICE_SECONDS, limits.deadline - now)
+                seconds = min(_SLICE_SECONDS, left)
                 if builder.complete:
                     began = time.perf_counter()
                     builder.audit(max(AUDIT_POINTS, round(AUDIT_SHARE * builder.n_charts)), seconds)
@@ -130,7 +139,8 @@ class Growth:
                 print(f"interrupted: keeping {builder.n_charts} charts", file=sys.stderr)
             return Status.INTERRUPTED
         finally:
-            bar.close()
+            with held():
+                bar.close()
         return Status.COMPLETE
 
     def expected_size(self, seconds: float) -> int | None:

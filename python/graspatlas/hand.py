@@ -17,7 +17,7 @@ from graspatlas.files import read_text
 from graspatlas.mimics import Mechanism
 from graspatlas.pickling import Light
 from graspatlas.robot_files import find_file, package_folders, robots_folder
-from graspatlas.tables import checked_table, numbers
+from graspatlas.tables import checked_table, numbers, read_only
 from graspatlas.urdf import joint_limits, joints_of_kind, lock_joints, mimics, moving_joints, with_followers_limited
 from graspatlas.urdf_checks import LARGEST, check_urdf
 
@@ -311,7 +311,7 @@ class Hand(Body):
                 upper[joint.q_index : joint.q_index + 2] = np.inf
             if joint.name in self.limits:
                 lower[joint.q_index], upper[joint.q_index] = self.limits[joint.name]
-        return lower, upper
+        return read_only(lower), read_only(upper)
 
     @property
     def limits_by_name(self) -> dict[str, tuple[float, float]]:

@@ -10,6 +10,7 @@ grasp". This module lets you test that on your own result::
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -25,6 +26,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasps
 from graspatlas.quality import Quality, evaluate
 from graspatlas.requirements import Require, Requirement, screen
+from graspatlas.search import deadline_after
 from graspatlas.tables import number_array, shown
 
 if TYPE_CHECKING:
@@ -95,7 +97,7 @@ class Climb:
         chart: Chart at whose centre it started; -1 when it started elsewhere.
         x: Where it ended [configuration_size].
         qualities: The index at the start and after each step; never decreasing.
-        converged: False when it was given up after the largest number of steps.
+        converged: False when it was given up after the largest number of steps, or the longest time.
     """
 
     chart: int
@@ -118,7 +120,14 @@ class Climb:
         return len(self.qualities) - 1
 
 
-def climb(result: Result, start: int | ArrayLike, *, all_motions: bool = False, max_steps: int = MAX_STEPS) -> Climb:
+def climb(
+    result: Result,
+    start: int | ArrayLike,
+    *,
+    all_motions: bool = False,
+    max_steps: int = MAX_STEPS,
+    max_seconds: float | None = None,
+) -> Climb:
     """Climb to a local maximum of the index, on the manifold, within its bounds and the result's requirements.
 
     In the tangent space of the current grasp, SLSQP of SciPy maximises the index of the projected point over the
@@ -131,6 +140,7 @@ def climb(result: Result, start: int | ArrayLike, *, all_motions: bool = False, 
         start: Number of the chart at whose centre to start, or a grasp [configuration_size].
         all_motions: Climb in all t dimensions of F, no hand motion frozen but the couplings, instead of in R.
         max_steps: Steps after which the climb is given up: an index without bound is climbed for ever.
+        max_seconds: Time after which the climb is given up, at the end of a step; none by default.
 
     Returns:
         The climb.
@@ -143,6 +153,7 @@ def climb(result: Result, start: int | ArrayLike, *, all_motions: bool = False, 
         raise GraspAtlasError(f"result must be what graspatlas.optimize returned, got {type(result).__name__}")
     if isinstance(max_steps, bool) or not isinstance(max_steps, int | np.integer) or max_steps < 1:
         raise GraspAtlasError(f"max_steps must be a whole number of at least 1, got {max_steps!r}")
+    deadline = deadline_after(max_seconds)
     hill = _Hill.of(result, all_motions)
     chart, x = _start(result, start)
     residual = float(np.abs(hill.system.evaluate_residual(x)).max(initial=0.0))
@@ -158,7 +169,7 @@ def climb(result: Result, start: int | ArrayLike, *, all_motions: bool = False, 
     value = float(evaluate(result.quality, hill.grasps(x))[0])
     reach = hill.radius
     qualities = [value]
-    while reach > SMALLEST_REACH * hill.radius and len(qualities) <= max_steps:
+    while reach > SMALLEST_REACH * hill.radius and len(qualities) <= max_steps and time.perf_counter() < deadline:
         place = _Surroundings(hill, x, value, reach)
         better = place.optimised() or place.best_of_ring()
         if better is None:

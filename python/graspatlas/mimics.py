@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.motions import HandMotions
 from graspatlas.pickling import Light
+from graspatlas.tables import read_only
 
 __all__ = ["Mechanism", "Mimic", "read_mimics"]
 
@@ -144,12 +145,13 @@ class Mechanism(Light):
         for row, name in zip(A, self.joints, strict=True):
             mimic = self.followers.get(name)
             row[self.driven.index(mimic.driver if mimic else name)] = mimic.multiplier if mimic else 1.0
-        return A
+        return read_only(A)
 
     @cached_property
     def b(self) -> Array:
         """Joint positions where all driven joints are at 0 [h], radians and metres."""
-        return np.array([self.followers[name].offset if name in self.followers else 0.0 for name in self.joints])
+        offsets = [self.followers[name].offset if name in self.followers else 0.0 for name in self.joints]
+        return read_only(np.array(offsets))
 
     @cached_property
     def rows(self) -> Array:
@@ -158,7 +160,7 @@ class Mechanism(Light):
         for row, mimic in zip(rows, self.mimics, strict=True):
             row[self.joints.index(mimic.joint)] = 1.0
             row[self.joints.index(mimic.driver)] = -mimic.multiplier
-        return rows
+        return read_only(rows)
 
     def completed(self, positions: Mapping[str, float], what: str) -> dict[str, float]:
         """Positions of all joints [rad or m], of those that mimic others as their drivers have them.

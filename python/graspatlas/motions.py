@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graspatlas.errors import GraspAtlasError, unknown_name
-from graspatlas.tables import checked_instance, checked_table, number, number_array
+from graspatlas.tables import checked_instance, checked_table, number, number_array, read_only
 
 __all__ = ["HandMotions", "coupling_rows"]
 
@@ -63,10 +63,10 @@ class HandMotions:
         if len(set(self.joints)) != h:
             raise GraspAtlasError("a joint of the hand motions is named twice")
         object.__setattr__(self, "joints", tuple(self.joints))
-        object.__setattr__(self, "mean", mean)
-        object.__setattr__(self, "covariance", covariance)
+        object.__setattr__(self, "mean", read_only(mean.copy()))
+        object.__setattr__(self, "covariance", read_only(covariance.copy()))
         couplings = number_array(self.couplings, "the couplings of the hand motions")
-        object.__setattr__(self, "couplings", couplings if couplings.size else np.zeros((0, h)))
+        object.__setattr__(self, "couplings", read_only(couplings.copy() if couplings.size else np.zeros((0, h))))
         self._check_couplings()
 
     def __repr__(self) -> str:

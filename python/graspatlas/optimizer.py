@@ -14,18 +14,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graspatlas import _core
-from graspatlas.atlas import Atlas, Audit
+from graspatlas.atlas import Atlas, Audit, Status
 from graspatlas.checkpoints import CheckpointFolder, run_digest
 from graspatlas.errors import GraspAtlasError
-from graspatlas.grasps import Grasps
 from graspatlas.growth import Growth, Limits, available_bytes, available_threads
+from graspatlas.interrupts import hear, held, keeping, stoppable, stopping
 from graspatlas.problem import Problem
-from graspatlas.quality import Quality, evaluate, find_index, quality_name
+from graspatlas.quality import Quality, find_index, quality_name
+from graspatlas.readings import Reading, check_atlas_of
 from graspatlas.refinement import refine as climb_peaks
-from graspatlas.requirements import Require, screen
+from graspatlas.requirements import Require
 from graspatlas.result import Result
 from graspatlas.search import with_first_grasp
-from graspatlas.systems import AnySystem, check_jacobian
+from graspatlas.systems import AnySystem, check_finite, check_jacobian
 from graspatlas.tables import number, number_array, shown
 
 __all__ = ["build_atlas", "optimize"]
@@ -35,8 +36,11 @@ _NO_LIMIT = 2**62
 MOST_THREADS = 4096
 #: More than so many threads a core, and than so many in all, are not started: they would only wait for one another.
 THREADS_A_CORE, ALWAYS_ALLOWED = 4, 32
+#: Time that is left where none is [s].
+_SHORTEST = 1e-9
 
 
+@stoppable()
 def build_atlas(
     system: AnySystem,
     x0: ArrayLike,
@@ -52,8 +56,8 @@ def build_atlas(
 ) -> Atlas:
     """Cover the solutions of R(x) = 0 that are connected to a first point with charts.
 
-    Ctrl-C ends the work and returns what there is, with a status that says so. The atlas is the same to the bit for
-    any number of threads.
+    Ctrl-C ends the work and returns what there is, with a status that says so; a second one while that is put together
+    changes nothing, see :mod:`graspatlas.interrupts`. The atlas is the same to the bit for any number of threads.
 
     Args:
         system: The equations: one of :mod:`graspatlas.systems`, a problem's, or your own subclass of
@@ -81,27 +85,50 @@ def build_atlas(
     """
     if not isinstance(system, AnySystem):
         raise GraspAtlasError(f"system must be a graspatlas.System, got {type(system).__name__}")
-    radius = _positive("radius", radius)
-    epsilon = _positive("epsilon", epsilon)
-    charts = _NO_LIMIT if max_charts is None else _whole("max_charts", max_charts)
-    seconds = float("inf") if max_seconds is None else _positive("max_seconds", max_seconds)
-    memory = available_bytes() if max_bytes is None else _positive("max_bytes", max_bytes)
+    options = (_positive("radius", radius), _positive("epsilon", epsilon))
+    start = time.perf_counter()
+    limits = Limits(
+        charts=_NO_LIMIT if max_charts is None else _whole("max_charts", max_charts),
+        deadline=start + _seconds(max_seconds),
+        memory=available_bytes() if max_bytes is None else _positive("max_bytes", max_bytes),
+    )
     workers = available_threads() if threads is None else _whole("threads", threads, MOST_THREADS)
     workers = min(workers, max(ALWAYS_ALLOWED, THREADS_A_CORE * available_threads()))
+    return _grown(system, _numbers("x0", x0), (*options, workers), limits, checkpoint, progress)
+
+
+def _grown(
+    system: AnySystem,
+    x0: NDArray[np.float64],
+    options: tuple[float, float, int],
+    limits: Limits,
+    checkpoint: str | os.PathLike[str] | None,
+    progress: bool | None,
+) -> Atlas:
+    """The atlas of options that are checked: radius, epsilon and threads."""
     start = time.perf_counter()
-    first = _numbers("x0", x0)
-    folder = (
-        CheckpointFolder(checkpoint, run_digest(system, first, radius, epsilon)) if checkpoint is not None else None
-    )
-    builder = _builder(system, first, (radius, epsilon, workers), folder)
-    growth = Growth(builder, system, first, radius, epsilon)
-    status = growth.run(Limits(charts, start + seconds, memory), progress, folder)
-    audit = Audit(points=builder.audit_points, holes=builder.audit_holes, seconds=growth.audit_seconds)
-    seconds = time.perf_counter() - start
-    arrays = builder.arrays()
-    return Atlas(
-        system=system, radius=radius, epsilon=epsilon, status=status, seconds=seconds, audit=audit, **arrays
-    )
+    radius, epsilon, _ = options
+    folder = CheckpointFolder(checkpoint, run_digest(system, x0, radius, epsilon)) if checkpoint is not None else None
+    builder = _builder(system, x0, options, folder)
+    growth = Growth(builder, system, x0, radius, epsilon)
+    try:
+        status = growth.run(limits, progress, folder)
+    except KeyboardInterrupt:  # it came when the growth had just ended
+        status = Status.COMPLETE if builder.audited else Status.INTERRUPTED
+    with held():
+        audit = Audit(points=builder.audit_points, holes=builder.audit_holes, seconds=growth.audit_seconds)
+        atlas = Atlas(
+            system=system,
+            radius=radius,
+            epsilon=epsilon,
+            status=status,
+            seconds=time.perf_counter() - start,
+            audit=audit,
+            **builder.arrays(),
+        )
+    with keeping(atlas=atlas):
+        hear()
+    return atlas
 
 
 def _builder(
@@ -113,7 +140,11 @@ def _builder(
     """A builder at x0, or where a checkpoint left off."""
     saved = folder.load() if folder else None
     if saved is None:
-        builder = _core.AtlasBuilder(system, x0, *options)
+        try:
+            builder = _core.AtlasBuilder(system, x0, *options)
+        except GraspAtlasError:
+            check_finite(system, x0)
+            raise
         check_jacobian(system, builder.arrays()["centers"][0])
         return builder
     builder = _core.AtlasBuilder.resume(system, saved, *options)
@@ -121,6 +152,7 @@ def _builder(
     return builder
 
 
+@stoppable()
 def optimize(
     problem: Problem,
     *,
@@ -136,10 +168,12 @@ def optimize(
     threads: int | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: bool | None = None,
+    atlas: Atlas | None = None,
 ) -> Result:
     """Find the best grasp of a problem: trace all relevant grasps, then read a quality index on them.
 
-    What is not given comes from ``problem.defaults``.
+    What is not given comes from ``problem.defaults``. Ctrl-C ends the tracing and the refinement and returns what there
+    is by then; while the index is read of a complete atlas it raises ``KeyboardInterrupt``, which carries the atlas.
 
     Args:
         problem: The problem; see :func:`graspatlas.load_problem`. Without x1 a first grasp is searched, and the result
@@ -154,60 +188,55 @@ def optimize(
         refine: Climb from the best charts to the maximum between the charts' centres, ``result.refined_best``: in R
             with True or ``"relevant"``, then on in all dimensions of F with ``"feasible"``; see :func:`refine`.
         max_charts: See :func:`build_atlas`.
-        max_seconds: See :func:`build_atlas`.
+        max_seconds: Time for all of it; none by default. The search for a first grasp ends in an error when it takes
+            longer. The atlas is cut short so that about the time is left that reading the index and the requirements
+            takes, which is measured at x1; and climbs that go on then are given up.
         max_bytes: See :func:`build_atlas`.
         threads: See :func:`build_atlas`.
         checkpoint: See :func:`build_atlas`.
         progress: See :func:`build_atlas`.
+        atlas: An atlas of the same problem and options to read instead of tracing one: that of another result, or the
+            attribute ``atlas`` of the error with which an index or a requirement of yours ended an earlier call.
 
     Returns:
         The result: best and worst grasp, atlas, qualities and status. Only when ``result.is_global`` the best grasp is
         the best of all that are connected to x1 and meet the requirements, up to the size of a chart.
 
     Raises:
-        GraspAtlasError: If an argument makes no sense, the index fails, or no first grasp is found.
+        GraspAtlasError: If an argument makes no sense, the index fails, or no first grasp is found. An error after the
+            atlas, and ``KeyboardInterrupt``, has it as its attribute ``atlas``, and after the index ``result``.
 
     Source: "Global Optimization of Robotic Grasps", Algorithm 1.
     """
+    start = time.perf_counter()
     chosen = {"dimension": dimension, "radius": radius, "epsilon": epsilon, "quality": quality}
     options = options_of(problem, chosen)
-    first, *others = _indices(options["quality"])
     if refine not in (False, True, "relevant", "feasible"):
         raise GraspAtlasError(f"refine must be True, False, 'relevant' or 'feasible', got {refine!r}")
+    reading = Reading(_indices(options["quality"]), problem.requirements if require is None else require)
+    deadline = start + _seconds(max_seconds)
     problem = with_first_grasp(problem, options["dimension"], max_seconds, progress)
-    system = problem.system(options["dimension"])
-    atlas = build_atlas(
-        system,
-        problem.start(options["dimension"]),
-        radius=options["radius"],
-        epsilon=options["epsilon"],
-        max_charts=max_charts,
-        max_seconds=max_seconds,
-        max_bytes=max_bytes,
-        threads=threads,
-        checkpoint=checkpoint,
-        progress=progress,
-    )
-    start = time.perf_counter()
-    grasps = Grasps(problem, atlas.centers, system)
-    require = problem.requirements if require is None else require
-    feasible, refused = screen(require, grasps)
-    qualities = evaluate(first, grasps)
-    values = {quality_name(other): evaluate(other, grasps) for other in others}
-    result = Result(
-        problem=problem,
-        atlas=atlas,
-        quality=first,
-        qualities=qualities,
-        quality_seconds=time.perf_counter() - start,
-        requirements=tuple(require),
-        feasible=feasible,
-        refused=refused,
-        others=values,
-    )
-    if refine and feasible.any():
-        found = climb_peaks(result, all_motions=refine == "feasible", progress=progress)
-        result = replace(result, refinement=found)
+    if atlas is None:
+        system, x0 = problem.system(options["dimension"]), problem.start(options["dimension"])
+        reading.try_out(problem, system, x0)
+        limits = Limits(
+            charts=_NO_LIMIT if max_charts is None else _whole("max_charts", max_charts),
+            deadline=deadline,
+            memory=available_bytes() if max_bytes is None else _positive("max_bytes", max_bytes),
+            seconds_each=0.0 if max_seconds is None else reading.seconds_each(problem, system, x0),
+        )
+        workers = available_threads() if threads is None else _whole("threads", threads)
+        sizes = (_positive("radius", options["radius"]), _positive("epsilon", options["epsilon"]), workers)
+        atlas = _grown(system, x0, sizes, limits, checkpoint, progress)
+    else:
+        check_atlas_of(problem, options, atlas)
+    with keeping(atlas=atlas):
+        result = reading.at(problem, atlas)
+        if refine and result.feasible.any() and not stopping():
+            with keeping(result=result):
+                left = None if max_seconds is None else max(deadline - time.perf_counter(), _SHORTEST)
+                found = climb_peaks(result, all_motions=refine == "feasible", max_seconds=left, progress=progress)
+            result = replace(result, refinement=found)
     return result
 
 
@@ -246,6 +275,10 @@ def _positive(name: str, value: float) -> float:
     if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < number(value, name) < float("inf"):
         raise GraspAtlasError(f"{name} must be a positive number, got {shown(value)}")
     return float(value)
+
+
+def _seconds(max_seconds: float | None) -> float:
+    return float("inf") if max_seconds is None else _positive("max_seconds", max_seconds)
 
 
 def _whole(name: str, value: int, most: int | None = None) -> int:

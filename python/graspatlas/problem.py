@@ -22,7 +22,7 @@ from graspatlas.patches import Patch
 from graspatlas.pickling import Light
 from graspatlas.pose_guess import PoseGuess
 from graspatlas.requirements import Requirement, requirement_from_dict
-from graspatlas.tables import checked_instance, checked_table, number, number_array, shown
+from graspatlas.tables import checked_instance, checked_table, number, number_array, read_only, shown
 
 __all__ = ["Problem"]
 
@@ -218,7 +218,7 @@ class Problem(Light):
         for joint in self.hand.model.hand_joints:
             if joint.prismatic:
                 units[joint.v_index] = self.length_scale
-        return units
+        return read_only(units)
 
     @cached_property
     def full_dimension(self) -> int:
@@ -324,7 +324,7 @@ class Problem(Light):
     @cached_property
     def reference_array(self) -> Array:
         """The reference posture as a joint configuration [nq]."""
-        return posture_array(self.hand, self.reference_posture, "the reference posture")
+        return read_only(posture_array(self.hand, self.reference_posture, "the reference posture"))
 
     @cached_property
     def x1_array(self) -> Array:
@@ -340,7 +340,8 @@ class Problem(Light):
                 f"problem '{self.name}' has no first grasp x1: give one, or take one that is found, as in "
                 "problem.at(graspatlas.find_grasps(problem)[0])"
             )
-        return first_grasp_to_array(self.x1, self.hand, self.contacts, self.object_joint, self.length_scale)
+        x1 = first_grasp_to_array(self.x1, self.hand, self.contacts, self.object_joint, self.length_scale)
+        return read_only(x1)
 
     def at(self, x: ArrayLike) -> Problem:
         """The same problem with another first grasp; the hand motions that are kept pass where they did.

@@ -6,8 +6,9 @@ singular values of :math:`J^+ G^\top` over the coordinated motions, with lengths
 contact forces hold the object (see :mod:`graspatlas.wrenches`), how evenly they act on it, and how free the joints are
 to move.
 
-Your own index is any function of one :class:`~graspatlas.grasps.Grasp` that returns a number. One that takes a whole
-:class:`~graspatlas.grasps.Grasps` batch and returns an array [n] is marked by :func:`batched`::
+Your own index is any function of one :class:`~graspatlas.grasps.Grasp` that returns a finite number. One that takes a
+whole :class:`~graspatlas.grasps.Grasps` batch and returns an array [n] is marked by :func:`batched`. It cannot write to
+the arrays that it gets::
 
     @ga.batched
     def spread(grasps):
@@ -24,8 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspatlas import _core, wrenches
+from graspatlas.callables import called_numbers
 from graspatlas.errors import GraspAtlasError, unknown_name
-from graspatlas.grasps import Grasp, Grasps
+from graspatlas.grasps import Grasps
 from graspatlas.tables import number
 from graspatlas.wrenches import checked_positive
 
@@ -400,6 +402,8 @@ INDICES: dict[str, Callable[[Grasps], Array]] = {
         joint_centrality,
     )
 }
+#: Indices of this package, whose values need no check.
+_OWN = tuple(INDICES.values())
 
 
 def find_index(quality: Quality) -> Callable[[Any], Any]:
@@ -428,33 +432,13 @@ def evaluate(quality: Quality, grasps: Grasps) -> Array:
         grasps: The grasps.
 
     Raises:
-        GraspAtlasError: If there is no such index, or a callable raises, or returns the wrong shape or a NaN.
+        GraspAtlasError: If there is no such index, or a callable raises, or returns anything but finite numbers; see
+            :mod:`graspatlas.callables`.
     """
     index, name = find_index(quality), quality_name(quality)
-    try:
-        if getattr(index, "batched", False):
-            values = np.asarray(index(grasps), float)
-        else:
-            values = np.array([_number(index, grasp, name) for grasp in grasps], float).reshape(len(grasps))
-    except GraspAtlasError:
-        raise
-    except Exception as error:
-        raise GraspAtlasError(f"quality index '{name}' raised {type(error).__name__}: {error}") from error
-    if values.shape != (len(grasps),):
-        raise GraspAtlasError(
-            f"quality index '{name}' must return {len(grasps)} numbers for {len(grasps)} grasps; "
-            f"it returned an array of shape {values.shape}"
-        )
+    if index not in _OWN:
+        return called_numbers(index, name, grasps)
+    values = np.asarray(index(grasps), float)
     if np.isnan(values).any():
-        raise GraspAtlasError(f"quality index '{name}' returned NaN for grasp {int(np.isnan(values).argmax())}")
+        raise GraspAtlasError(f"quality index '{name}' is NaN for grasp {int(np.isnan(values).argmax())}")
     return values
-
-
-def _number(index: Callable[[Grasp], Any], grasp: Grasp, name: str) -> float:
-    value = np.asarray(index(grasp), float)
-    if value.ndim != 0:
-        raise GraspAtlasError(
-            f"quality index '{name}' must return one number for one grasp; it returned an array of shape {value.shape} "
-            "(an index that takes all grasps at once is marked with graspatlas.batched)"
-        )
-    return float(value)

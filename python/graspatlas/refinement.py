@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -12,7 +13,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from graspatlas.errors import GraspAtlasError
+from graspatlas.interrupts import held, stoppable, stopping
 from graspatlas.local_search import Climb, Peak, climb, local_maxima, peaks_of
+from graspatlas.search import deadline_after
 
 if TYPE_CHECKING:
     from graspatlas.result import Result
@@ -37,7 +40,7 @@ class Refinement:
         starts: Chart from which the climb to each began [p].
         converged: False for those that were still climbing when given up: the index may have no maximum there [p].
         all_motions: True when no hand motion was frozen but the couplings: the grasps lie in F, not only in R.
-        complete: False when interrupted, so that basins may be missing, or climbs in F.
+        complete: False when interrupted or cut short, so that basins may be missing, or climbs in F.
     """
 
     x: Array
@@ -57,7 +60,10 @@ class Refinement:
         return len(self.x)
 
 
-def refine(result: Result, *, all_motions: bool = False, progress: bool | None = None) -> Refinement:
+@stoppable()
+def refine(
+    result: Result, *, all_motions: bool = False, max_seconds: float | None = None, progress: bool | None = None
+) -> Refinement:
     """Climb from the best chart of each basin, on the manifold and within bounds and requirements.
 
     A basin is what one local maximum of the index over the charts stands for. Its climb is that of
@@ -69,6 +75,7 @@ def refine(result: Result, *, all_motions: bool = False, progress: bool | None =
     Args:
         result: The result.
         all_motions: Go on from there in F, no hand motion frozen but the couplings.
+        max_seconds: Time after which the climbs are given up, and ``complete`` is False; none by default.
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
     Returns:
@@ -79,6 +86,7 @@ def refine(result: Result, *, all_motions: bool = False, progress: bool | None =
 
     Source: refines the grid search of "Global Optimization of Robotic Grasps", Section IV.
     """
+    deadline = deadline_after(max_seconds)
     charts = local_maxima(result)[:MOST_STARTS]
     if len(charts) == 0:
         raise GraspAtlasError("no grasp meets the requirements, so there is none to refine: relax one")
@@ -96,7 +104,8 @@ def refine(result: Result, *, all_motions: bool = False, progress: bool | None =
     complete = True
     try:
         for chart in charts:
-            ends.append(climb(result, int(chart)))
+            left = _time_left(deadline)
+            ends.append(climb(result, int(chart), max_seconds=left))
             bar.update()
         if all_motions:
             # Climbs in R that met go on as one.
@@ -104,7 +113,8 @@ def refine(result: Result, *, all_motions: bool = False, progress: bool | None =
             bar.total = len(charts) + len(tops)
             starts, ends = starts[tops], [ends[top] for top in tops]
             for i, end in enumerate(ends):
-                ends[i] = climb(result, end.x, all_motions=True)
+                left = _time_left(deadline)
+                ends[i] = climb(result, end.x, all_motions=True, max_seconds=left)
                 bar.update()
     except KeyboardInterrupt:
         complete = False
@@ -112,7 +122,8 @@ def refine(result: Result, *, all_motions: bool = False, progress: bool | None =
             best = result.best
             ends, starts = [Climb(best.chart, best.x, np.array([best.quality]), False)], np.array([best.chart])
     finally:
-        bar.close()
+        with held():
+            bar.close()
     peaks = peaks_of(result, ends)
     return Refinement(
         x=np.array([peak.x for peak in peaks]),
@@ -122,6 +133,18 @@ def refine(result: Result, *, all_motions: bool = False, progress: bool | None =
         all_motions=all_motions,
         complete=complete,
     )
+
+
+def _time_left(deadline: float) -> float | None:
+    """Time for a climb [s]; None for no limit.
+
+    Raises:
+        KeyboardInterrupt: If there is none left, or a signal has asked for the end: both end the climbs alike.
+    """
+    left = deadline - time.perf_counter()
+    if left <= 0.0 or stopping():
+        raise KeyboardInterrupt
+    return None if left == float("inf") else left
 
 
 def _top(peak: Peak, ends: Sequence[Climb]) -> int:

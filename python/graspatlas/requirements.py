@@ -1,7 +1,8 @@
 """Requirements that a grasp must meet before its quality counts: force closure, no collision, distance from limits.
 
-A requirement is one of the classes below, or any function of a grasp that returns whether it will do; one that takes a
-whole batch of :class:`~graspatlas.grasps.Grasps` and returns an array [n] is marked by :func:`graspatlas.batched`.
+A requirement is one of the classes below, or any function of a grasp that returns True where it will do, False where
+not, and nothing else; one that takes a whole batch of :class:`~graspatlas.grasps.Grasps` and returns an array [n] of
+booleans is marked by :func:`graspatlas.batched`. Neither can write to the arrays that it gets.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspatlas import _core
+from graspatlas.callables import called_flags
 from graspatlas.collision import CollisionChecker
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.grasps import Grasps
@@ -30,6 +32,7 @@ __all__ = [
     "JointMargin",
     "Require",
     "Requirement",
+    "check_requirements",
     "parse_requirement",
     "requirement_from_dict",
     "requirement_name",
@@ -257,6 +260,21 @@ def requirement_from_dict(data: Mapping[str, Any]) -> Requirement:
     return REQUIREMENTS[name](**checked_table(values or {}, f"requirement {name}", (), attributes))
 
 
+def check_requirements(requirements: Sequence[Require]) -> None:
+    """Make sure that requirements are a list or tuple of named ones and functions.
+
+    Raises:
+        GraspAtlasError: If they are not.
+    """
+    checked_instance(requirements, (list, tuple), "require")
+    for requirement in requirements:
+        if not isinstance(requirement, Requirement) and not callable(requirement):
+            raise GraspAtlasError(
+                f"a requirement is one of {', '.join(REQUIREMENTS)} or a function of a grasp, not "
+                f"{shown(requirement)}; requirements.parse_requirement reads text"
+            )
+
+
 def screen(requirements: Sequence[Require], grasps: Grasps) -> tuple[Flags, dict[str, int]]:
     """Which grasps meet all requirements, the cheapest asked first and only of those that are left.
 
@@ -268,19 +286,13 @@ def screen(requirements: Sequence[Require], grasps: Grasps) -> tuple[Flags, dict
         Flags [n], and how many grasps each requirement refused.
 
     Raises:
-        GraspAtlasError: If a predicate raises or returns the wrong shape.
+        GraspAtlasError: If a function raises or returns anything but True and False; see :mod:`graspatlas.callables`.
     """
-    checked_instance(requirements, (list, tuple), "require")
-    for requirement in requirements:
-        if not isinstance(requirement, Requirement) and not callable(requirement):
-            raise GraspAtlasError(
-                f"a requirement is one of {', '.join(REQUIREMENTS)} or a function of a grasp, not "
-                f"{shown(requirement)}; requirements.parse_requirement reads text"
-            )
+    check_requirements(requirements)
     left = np.arange(len(grasps))
     refused: dict[str, int] = {}
     for requirement in sorted(requirements, key=lambda r: r.cost if isinstance(r, Requirement) else 1):
-        met = _met(requirement, Grasps(grasps.problem, grasps.x[left], grasps.system))
+        met = _met(requirement, Grasps(grasps.problem, grasps.x[left], grasps.system, grasps.charts[left]))
         refused[requirement_name(requirement)] = int((~met).sum())
         left = left[met]
     flags = np.zeros(len(grasps), bool)
@@ -293,17 +305,4 @@ def _met(requirement: Require, grasps: Grasps) -> Flags:
         return np.zeros(0, bool)
     if isinstance(requirement, Requirement):
         return requirement.met(grasps)
-    name = requirement_name(requirement)
-    try:
-        if getattr(requirement, "batched", False):
-            met = np.asarray(requirement(grasps))
-        else:
-            met = np.array([bool(requirement(grasp)) for grasp in grasps])
-    except Exception as error:
-        raise GraspAtlasError(f"requirement '{name}' raised {type(error).__name__}: {error}") from error
-    if met.shape != (len(grasps),) or met.dtype != bool:
-        raise GraspAtlasError(
-            f"requirement '{name}' must return {len(grasps)} booleans for {len(grasps)} grasps; "
-            f"it returned an array of shape {met.shape} and type {met.dtype}"
-        )
-    return met
+    return called_flags(requirement, requirement_name(requirement), grasps)

@@ -22,6 +22,7 @@ from graspatlas.quality import Quality, evaluate, quality_name
 from graspatlas.refinement import Refinement
 from graspatlas.requirements import Require, requirement_name, screen
 from graspatlas.result_files import read_result, save_result
+from graspatlas.tables import read_only
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -33,7 +34,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Result(Light):
-    """The best grasp, and everything it was chosen from.
+    """The best grasp, and everything it was chosen from. Its arrays cannot be written to: copy what you want to change.
 
     Attributes:
         problem: The problem.
@@ -63,6 +64,11 @@ class Result(Light):
         atlas = f"{self.atlas.n_charts} charts, k = {self.dimension}, {self.status}"
         best = f"{self.qualities[self.feasible].max():.6g}" if self.feasible.any() else "none, no grasp will do"
         return f"<Result of {self.problem.name!r}: {atlas}; best {quality_name(self.quality)} {best}>"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "qualities", read_only(self.qualities))
+        object.__setattr__(self, "feasible", read_only(self.feasible))
+        object.__setattr__(self, "others", {name: read_only(values) for name, values in self.others.items()})
 
     @property
     def status(self) -> Status:
@@ -147,7 +153,8 @@ class Result(Light):
             return self.qualities
         if isinstance(quality, str) and name in self.others:
             return self.others[name]
-        return evaluate(quality, Grasps(self.problem, self.atlas.centers, self.atlas.system))  # type: ignore[arg-type]
+        charts = np.arange(self.atlas.n_charts)
+        return evaluate(quality, Grasps(self.problem, self.atlas.centers, self.atlas.system, charts))  # type: ignore[arg-type]
 
     def by(self, quality: Quality) -> Result:
         """The same grasps with another index to choose the best by; not refined.

@@ -33,6 +33,7 @@ from graspatlas import _core
 from graspatlas.atlas import Atlas, shortest_way
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasp, Grasps
+from graspatlas.interrupts import stoppable
 from graspatlas.pickling import Light
 from graspatlas.quality import evaluate
 from graspatlas.requirements import screen
@@ -125,6 +126,7 @@ class Samples(Grid):
         return {name: getattr(self, name) for name in ("x", "charts", "u", "qualities", "feasible")}
 
 
+@stoppable()
 def densify(result: Result, spacing: float, *, share: float = 1.0, progress: bool | None = None) -> Samples:
     """Read the index on a denser grid: inside the polytopes, at a spacing of your choice.
 
@@ -199,6 +201,7 @@ def jumps(result: Result) -> Array:
     return largest
 
 
+@stoppable()
 def lay_grid(
     atlas: Atlas, spacing: float, *, charts: Sequence[int] | None = None, progress: bool | None = None
 ) -> Grid:

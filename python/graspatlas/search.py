@@ -19,6 +19,7 @@ from tqdm import tqdm
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.guessed_starts import starts_near
+from graspatlas.interrupts import stoppable
 from graspatlas.problem import Problem
 from graspatlas.projection import project
 from graspatlas.starts import Starts
@@ -37,6 +38,7 @@ MAX_SPECIAL = 50
 TRIAL_RADIUS, TRIAL_EPSILON = 1e-2, 0.5
 
 
+@stoppable()
 def find_grasps(
     problem: Problem,
     *,

@@ -20,6 +20,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from graspatlas.atlas import Atlas
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasp
+from graspatlas.interrupts import stoppable
 from graspatlas.paths import GraspPath, Path
 from graspatlas.result import Result
 from graspatlas.shortening import BOUND_TOLERANCE, Allowed, arc_lengths, bridge, evenly, shorten
@@ -68,6 +69,7 @@ def shortest_path(
 ) -> Path: ...
 
 
+@stoppable()
 def shortest_path(
     on: Result | Atlas,
     start: End = 0,

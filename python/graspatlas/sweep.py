@@ -26,6 +26,7 @@ from tqdm import tqdm
 from graspatlas import __version__
 from graspatlas.errors import GraspAtlasError
 from graspatlas.files import opened, replaced, writable_folder
+from graspatlas.interrupts import stoppable
 from graspatlas.optimizer import optimize
 from graspatlas.problem import Problem
 from graspatlas.problems import load_problem
@@ -145,6 +146,7 @@ class Sweep:
         return out
 
 
+@stoppable()
 def run_sweep(
     problems: Sequence[str | Path],
     output: str | os.PathLike[str],

@@ -22,7 +22,17 @@ from graspatlas._core import Angles, AnySystem, PythonSystem, Rotations, Sphere,
 from graspatlas.errors import GraspAtlasError
 from graspatlas.tables import number_array
 
-__all__ = ["Angles", "AnySystem", "Rotations", "Sphere", "System", "Torus", "check_jacobian", "jacobian_error"]
+__all__ = [
+    "Angles",
+    "AnySystem",
+    "Rotations",
+    "Sphere",
+    "System",
+    "Torus",
+    "check_finite",
+    "check_jacobian",
+    "jacobian_error",
+]
 
 Array = NDArray[np.float64]
 
@@ -95,6 +105,28 @@ def jacobian_error(system: AnySystem, x: ArrayLike, step: float = 1e-6) -> float
         columns.append((ahead - behind) / (2.0 * step))
     difference = np.array(columns).T - system.evaluate_jacobian(point)
     return float(np.abs(difference).max(initial=0.0))
+
+
+def check_finite(system: AnySystem, x: Array) -> None:
+    """Make sure that what a system written in Python returns at a first point is finite.
+
+    Elsewhere it need not be: the manifold ends where Newton's method meets no numbers, and the atlas counts that.
+
+    Args:
+        system: Any system; compiled ones are not asked.
+        x: A point; one of another size is not asked about either.
+
+    Raises:
+        GraspAtlasError: If it is not.
+    """
+    if not isinstance(system, System) or x.shape != (system.configuration_size,) or not np.isfinite(x).all():
+        return
+    for method, values in (("residual", system.evaluate_residual(x)), ("jacobian", system.evaluate_jacobian(x))):
+        if not np.isfinite(values).all():
+            raise GraspAtlasError(
+                f"x0 could not be projected onto the manifold: {method}(x) of {type(system).__name__} returned "
+                f"{'NaN' if np.isnan(values).any() else 'infinity'} there; give an x0 where the equations are defined"
+            )
 
 
 def check_jacobian(system: AnySystem, x: ArrayLike) -> None:

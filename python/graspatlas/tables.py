@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from numbers import Real
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,8 +19,11 @@ __all__ = [
     "number_array",
     "numbers",
     "pose_columns",
+    "read_only",
     "shown",
 ]
+
+T = TypeVar("T", bound=np.generic)
 
 
 def checked_instance(value: Any, kind: type | tuple[type, ...], what: str, hint: str = "") -> None:
@@ -108,6 +111,13 @@ def number_array(value: ArrayLike, what: str) -> NDArray[np.float64]:
         return np.asarray(value, float)
     except (TypeError, ValueError, OverflowError):
         raise GraspAtlasError(f"{what} must be an array of numbers, got {shown(value)}") from None
+
+
+def read_only(array: NDArray[T]) -> NDArray[T]:
+    """The same numbers, without a copy, as an array that cannot be written to; the one given can, if it could."""
+    view: NDArray[T] = array.view()
+    view.flags.writeable = False
+    return view
 
 
 def joined(*tables: Mapping[str, Any]) -> dict[str, Any]:
