@@ -138,7 +138,6 @@ CollisionSpace::CollisionSpace(std::shared_ptr<const CollisionScene> scene)
   solvers_->distance.resize(scene_->pairs_.size());
   // A guess that is stated, not what coal has left of the last question.
   solvers_->collision_request.gjk_initial_guess = coal::GJKInitialGuess::CachedGuess;
-  solvers_->collision_request.enable_contact = false;
   solvers_->distance_request.gjk_initial_guess = coal::GJKInitialGuess::CachedGuess;
   solvers_->distance_request.gjk_tolerance = kDistanceTolerance;
 }
