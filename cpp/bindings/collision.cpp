@@ -226,7 +226,13 @@ void bind_collision(py::module_& module) {
   module.def(
       "distances_from_hull",
       [](const DoubleArray& points, const DoubleArray& corners) {
-        return py::array_t<double>(py::cast(distances_from_hull(points_from(points), points_from(corners))));
+        const auto from = points_from(points), hull = points_from(corners);
+        std::vector<double> distances;
+        {
+          py::gil_scoped_release release;
+          distances = distances_from_hull(from, hull);
+        }
+        return py::array_t<double>(static_cast<py::ssize_t>(distances.size()), distances.data());
       },
       py::arg("points"), py::arg("corners"), "Distance of each point from the convex hull of others, 0 inside [n].");
 }

@@ -19,7 +19,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from graspatlas import _core
-from graspatlas.hulls import MANY_CORNERS, corners_of_hull, mesh_volume, shallow_volume
+from graspatlas.hulls import MANY_POINTS, corners_of_hull, mesh_volume, shallow_volume
 
 __all__ = ["Shape", "convex_hull", "convex_solid", "read_shapes", "thinner"]
 
@@ -150,7 +150,7 @@ def _hull_of(shape: Shape, otherwise: Any) -> Any:
 def _is_convex(mesh: Shape, hull: Shape) -> bool:
     """Whether a closed mesh fills its hull, but for the share CONVEX of its volume."""
     whole, filled = ConvexHull(hull.points), mesh_volume(mesh.points, mesh.triangles)
-    if len(mesh.points) <= MANY_CORNERS:
+    if len(mesh.points) <= MANY_POINTS:
         volume = ConvexHull(mesh.points).volume
         return bool(abs(filled - volume) <= CONVEX * volume)
     # The exact hull of so many points takes seconds: count what lies below the surface of the thinned one.

@@ -16,12 +16,12 @@ Array = NDArray[np.float64]
 FEW_CORNERS = 250
 #: Thinned hulls leave out at most this, and have at most so many corners; what is larger than a hand may lose more [m].
 LARGEST_ERROR, MOST_CORNERS = 1e-4, 8000
-#: Where faces lie this far above the corners that are left out, more corners are taken [m].
-ENOUGH = 0.5 * LARGEST_ERROR
-#: The exact hull of more points than this takes more than half a second.
-MANY_CORNERS = 40000
+#: A point this far above the corners that are left out is taken for a corner [m].
+ENOUGH = 0.7 * LARGEST_ERROR
+#: Of more points than this a sample decides at first: their exact hull takes seconds.
+MANY_POINTS = 20000
 #: Products of points and planes that are in memory at a time.
-AT_A_TIME = 1 << 22
+AT_A_TIME = 1 << 20
 
 
 def corners_of_hull(points: Array) -> tuple[Array, float]:
@@ -34,30 +34,42 @@ def corners_of_hull(points: Array) -> tuple[Array, float]:
         points: The points [n, 3], metres.
 
     Returns:
-        The corners [c, 3], and the largest distance of a point from their hull [m]: 0 where nothing was thinned.
+        The corners [c, 3], and a distance within which all points are from their hull [m]: 0 where nothing was thinned.
 
     Raises:
         scipy.spatial.QhullError: If the points have no volume.
         ValueError: If they are too few, or no numbers.
     """
-    if len(points) <= MANY_CORNERS:
+    if len(points) <= MANY_POINTS:
         points = points[ConvexHull(points).vertices]
         if len(points) <= FEW_CORNERS:
             return points, 0.0
-    chosen, waiting = _outermost(points), np.arange(len(points))
+    chosen = _chosen(points)
+    # Beyond an edge or corner a point is farther away than it is above any face. More corners bring none farther away.
+    distances = np.asarray(_core.distances_from_hull(points, points[chosen]))
+    while distances.max() > LARGEST_ERROR and len(chosen) < MOST_CORNERS:
+        far = np.flatnonzero(distances > LARGEST_ERROR)
+        more = far[np.argsort(distances[far])[::-1][: 1 + len(far) // 4]]
+        chosen = _corners(points, np.union1d(chosen, more))
+        distances[far] = _core.distances_from_hull(points[far], points[chosen])
+    return points[chosen], float(distances.max())
+
+
+def _chosen(points: Array) -> NDArray[np.intp]:
+    """Numbers of the corners of a hull above the faces of which no point is high, of a sample of the points."""
+    chosen, waiting = _outermost(points), np.arange(0, len(points), 1 + len(points) // MANY_POINTS)
     while True:
         hull = ConvexHull(points[chosen])
-        chosen, full = chosen[hull.vertices], len(hull.vertices) >= MOST_CORNERS
+        chosen = chosen[hull.vertices]
         waiting, more = _farthest(points, waiting, hull.equations)
-        if len(more) == 0 or full:
-            # Beyond an edge or corner a point is farther away than it is above any face.
-            distances = np.asarray(_core.distances_from_hull(points, points[chosen]))
-            far = np.flatnonzero(distances > LARGEST_ERROR)
-            if len(far) == 0 or full:
-                return points[chosen], float(distances.max())
-            waiting = far
-            more = far[np.argsort(distances[far])[::-1][: max(1, len(far) // 4)]]
+        if len(more) == 0 or len(chosen) >= MOST_CORNERS:
+            return chosen
         chosen = np.union1d(chosen, more)
+
+
+def _corners(points: Array, chosen: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Those of the chosen points that are corners of their hull."""
+    return np.asarray(chosen[ConvexHull(points[chosen]).vertices], np.intp)
 
 
 def _outermost(points: Array) -> NDArray[np.intp]:
@@ -101,8 +113,9 @@ def mesh_volume(points: Array, triangles: NDArray[np.int32]) -> float:
 
 
 def shallow_volume(points: Array, triangles: NDArray[np.int32], planes: Array) -> float:
-    """Volume between a mesh and the planes of a hull round it, where it lies shallow below them [m^3]."""
-    a, b, c = (points[corners] for corners in triangles.T)
+    """Volume between a mesh and the planes of a hull round it, where it lies shallow below them [m^3]; from a sample."""
+    step = 1 + len(triangles) // MANY_POINTS
+    a, b, c = (points[corners] for corners in triangles[::step].T)
     areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    depths = np.maximum(-_above(points, planes)[0], 0.0)
-    return float(areas @ depths[triangles].mean(axis=1))
+    depths = np.maximum(-_above((a + b + c) / 3.0, planes)[0], 0.0)
+    return step * float(areas @ depths)

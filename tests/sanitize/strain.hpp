@@ -56,6 +56,7 @@ class Random {
 };
 
 void atlases();
+void collisions();
 void grasps();
 void misuse();
 void neighbours();

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "graspatlas/continuation/system.hpp"
+#include "graspatlas/parallel.hpp"
 
 namespace graspatlas {
 
@@ -20,11 +21,15 @@ using Vector3 = Eigen::Vector3d;
 constexpr double kDot = 1e-6;
 /// Boxes and balls settle what is farther apart than this beyond what is required; coal settles the rest [m].
 constexpr double kDoubt = 1e-6;
+/// How exact distances from a hull are [m].
+constexpr double kHullTolerance = 1e-8;
 
 std::shared_ptr<coal::CollisionGeometry> convex_hull(const std::vector<Vector3>& points) {
   auto copy = std::make_shared<std::vector<coal::Vec3s>>(points.begin(), points.end());
-  return std::shared_ptr<coal::CollisionGeometry>(
+  const std::shared_ptr<coal::CollisionGeometry> hull(
       coal::ConvexBase::convexHull(copy, static_cast<unsigned int>(copy->size()), true, "Qt"));
+  hull->computeLocalAABB();
+  return hull;
 }
 
 std::shared_ptr<coal::CollisionGeometry> triangle_mesh(const CollisionShape& shape) {
@@ -243,18 +248,24 @@ double CollisionSpace::distance_of(const Vector3& point, int shape) {
 
 std::vector<double> distances_from_hull(const std::vector<Vector3>& points, const std::vector<Vector3>& corners) {
   const auto hull = convex_hull(corners);
-  hull->computeLocalAABB();
-  const coal::Sphere dot(0.0);
-  const coal::ComputeDistance compute(&dot, hull.get());
-  coal::DistanceRequest request;
-  request.enable_signed_distance = false;
-  std::vector<double> out;
-  out.reserve(points.size());
-  for (const Vector3& point : points) {
-    coal::DistanceResult result;
-    out.push_back(std::max(
-        0.0, compute(coal::Transform3s(Eigen::Matrix3d::Identity(), point), coal::Transform3s(), request, result)));
-  }
+  std::vector<double> out(points.size());
+  parallel_for(
+      available_threads(), static_cast<std::int64_t>(points.size()), [&](int, std::int64_t first, std::int64_t last) {
+        const coal::Sphere dot(0.0);
+        const coal::ComputeDistance compute(&dot, hull.get());
+        coal::DistanceRequest request;
+        request.gjk_tolerance = kHullTolerance;
+        request.gjk_initial_guess = coal::GJKInitialGuess::CachedGuess;
+        request.enable_signed_distance = false;
+        coal::DistanceResult result;
+        for (std::int64_t i = first; i < last; ++i) {
+          const Vector3& point = points[static_cast<std::size_t>(i)];
+          request.cached_gjk_guess = point - hull->aabb_local.center();
+          result.clear();
+          const coal::Transform3s here(Eigen::Matrix3d::Identity(), point);
+          out[static_cast<std::size_t>(i)] = std::max(0.0, compute(here, coal::Transform3s(), request, result));
+        }
+      });
   return out;
 }
 
