@@ -35,7 +35,7 @@ class Nearest:
     """Where pairs of shapes are nearest, or deepest in each other, for n grasps and p pairs.
 
     A change of x that moves the first shape's point by da and the second's by db changes the distance by
-    normal . (db - da), where the points are unique.
+    normal . (db - da), where the points are unique. Where two meshes cut each other points and normals are NaN.
 
     Attributes:
         pairs: Names of the shapes [p].
@@ -135,7 +135,8 @@ class CollisionChecker:
             pairs: Numbers of the pairs [p], in the order of the attribute `pairs`; all by default.
         """
         chosen = self._chosen(pairs)
-        return Nearest(tuple(self.pairs[i] for i in chosen), **self._core.nearest(self._rows(X), chosen))
+        found = self._core.nearest(self._rows(X), chosen)
+        return Nearest(tuple(self.pairs[i] for i in chosen), **found)
 
     def depths(self, x: ArrayLike, frame: str | None, points: ArrayLike) -> Array:
         """How far points are from the collision shapes of a link or of the object, at a grasp.

@@ -7,6 +7,7 @@
 #include <coal/shape/geometric_shapes.h>
 
 #include <cmath>
+#include <limits>
 
 #include "graspatlas/continuation/system.hpp"
 #include "graspatlas/parallel.hpp"
@@ -112,7 +113,8 @@ CollisionScene::CollisionScene(const Model& model, const std::vector<CollisionSh
     geometry.computeLocalAABB();
     const Vector3 center = geometry.aabb_local.center();
     const Vector3 half = 0.5 * (geometry.aabb_local.max_ - geometry.aabb_local.min_);
-    carriers_.push_back({shape.joint, shape.placement, center, half, ball_radius(shape, center, half)});
+    carriers_.push_back(
+        {shape.joint, shape.kind == ShapeKind::mesh, shape.placement, center, half, ball_radius(shape, center, half)});
   }
   for (const CollisionPair& pair : pairs_)
     if (std::min(pair.first, pair.second) < 0 || std::max(pair.first, pair.second) >= shape_count() ||
@@ -234,7 +236,15 @@ NearestPoints CollisionSpace::nearest(int pair) {
   coal::DistanceResult& result = solvers_->distance_result;
   result.clear();
   (*compute)(solvers_->transforms[p.first], solvers_->transforms[p.second], solvers_->distance_request, result);
-  return {result.min_distance, result.nearest_points[0], result.nearest_points[1], result.normal};
+  NearestPoints found{result.min_distance, result.nearest_points[0], result.nearest_points[1], result.normal};
+  if (scene_->carriers_[p.first].mesh && scene_->carriers_[p.second].mesh) {  // for which coal has no normal
+    const Vector3 between = found.on_second - found.on_first;
+    if (found.distance > 0.0)
+      found.normal = between / between.norm();
+    else
+      found.normal = found.on_first = found.on_second = Vector3::Constant(std::numeric_limits<double>::quiet_NaN());
+  }
+  return found;
 }
 
 double CollisionSpace::distance_of(const Vector3& point, int shape) {

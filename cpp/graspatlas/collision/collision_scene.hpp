@@ -15,7 +15,7 @@ struct CollisionPair {
   double required;
 };
 
-/// Where two shapes are nearest, or deepest in each other.
+/// Where two shapes are nearest, or deepest in each other. Where two meshes cut each other points and normal are NaN.
 struct NearestPoints {
   double distance;                      ///< [m]; negative in collision, but for meshes
   Eigen::Vector3d on_first, on_second;  ///< in the palm's frame [m]
@@ -43,6 +43,7 @@ class CollisionScene {
   /// A shape's box and ball, which are quick to compare.
   struct Carrier {
     int joint;
+    bool mesh;
     Placement placement;
     Eigen::Vector3d box_center, box_half;  ///< in the shape's frame [m]
     double radius;                         ///< of the ball about the box's centre [m]
