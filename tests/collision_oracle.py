@@ -86,7 +86,9 @@ def made_problem(folder: Any, hand_kinds: str, object_kinds: str, tip: str = "s"
                 f'<origin xyz="{xyz}"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="1" velocity="1"/>'
                 f"{mimic}</joint>"
             )
-    body = f'<robot name="thing"><link name="thing">{collisions(geometries(folder, rng, object_kinds), rng, 0.01)}</link>'
+    body = (
+        f'<robot name="thing"><link name="thing">{collisions(geometries(folder, rng, object_kinds), rng, 0.01)}</link>'
+    )
     return SimpleNamespace(
         hand=ga.Hand("made", urdf + "</robot>"),
         object=ga.Body("thing", body + "</robot>"),
@@ -142,7 +144,9 @@ class Oracle:
                     ball = coal.Sphere(other.geometry.radius - DEPTH)
                     self.pairs.append((Held(other.name, ball, tip, other.placement), shape, 0.0))
                 else:
-                    solid = Held(other.name, hull(other.geometry) if other.mesh else other.geometry, tip, other.placement)
+                    solid = Held(
+                        other.name, hull(other.geometry) if other.mesh else other.geometry, tip, other.placement
+                    )
                     self.pairs.append((solid, shape, -DEPTH))
 
     @staticmethod
@@ -180,3 +184,15 @@ def hull(mesh: Any) -> Any:
     for corner in np.unique(mesh.vertices(), axis=0):
         points.append(corner)
     return coal.Convex.convexHull(points, True, "Qt")
+
+
+def touching_grasps(problem: Any, count: int, seed: int = 2) -> Any:
+    """Configurations with the object about where the fingertip is, so that they touch or nearly [count, 13]."""
+    rng = np.random.default_rng(seed)
+    X = made_grasps(count, seed)
+    frame = problem.contacts[0].frame
+    for x in X:
+        away = rng.normal(size=3)
+        tip = problem.hand.link_placements(x[:6])[frame][:3, 3]
+        x[6:9] = tip + rng.uniform(0.008, 0.016) * away / np.linalg.norm(away)
+    return X

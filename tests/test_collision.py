@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import threading
@@ -109,10 +110,10 @@ MANY_RUNS = """
 import sys
 from pathlib import Path
 sys.path.insert(0, {tests!r})
-from collision_oracle import made_grasps, made_problem
+from collision_oracle import made_problem, touching_grasps
 from graspatlas.collision import CollisionChecker
-made, X = made_problem(Path({folder!r}), "scbm" * 8, "c"), made_grasps(100)
-answers = set()
+made = made_problem(Path({folder!r}), "scbm" * 8, "c", "h")
+X, answers = touching_grasps(made, 300), set()
 for _ in range(100):
     answers.add(CollisionChecker(made).free(X).tobytes())
 (answer,) = answers
@@ -121,11 +122,15 @@ print(sum(answer))
 
 
 def test_a_hundred_runs_with_32_shapes_give_one_answer(tmp_path):
-    """In a process of their own, which a fault in memory would end."""
-    code = MANY_RUNS.format(tests=str(Path(__file__).parent), folder=str(tmp_path))
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert found.returncode == 0, found.stderr
-    assert 0 < int(found.stdout) < 100
+    """In processes of their own, which faults in memory would end; one fills memory that is given back with rubbish."""
+    code, counts = MANY_RUNS.format(tests=str(Path(__file__).parent), folder=str(tmp_path)), set()
+    for rubbish in ("0", "85"):
+        environment = {**os.environ, "MALLOC_PERTURB_": rubbish}
+        found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
+        assert found.returncode == 0, found.stderr
+        counts.add(int(found.stdout))
+    assert len(counts) == 1
+    assert 30 < counts.pop() < 270
 
 
 def test_answers_do_not_depend_on_threads_or_on_what_was_asked_before(tmp_path):

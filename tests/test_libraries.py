@@ -15,7 +15,9 @@ from graspatlas.libraries import LIBRARIES, in_the_way
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or shutil.which("c++") is None, reason="needs Linux and a compiler"
 )
-LOAD = "import graspatlas as ga; print(ga.CollisionFree().met(ga.Grasps(p := ga.load_problem('schunk_can'), p.x1_array)))"
+LOAD = (
+    "import graspatlas as ga; print(ga.CollisionFree().met(ga.Grasps(p := ga.load_problem('schunk_can'), p.x1_array)))"
+)
 
 
 def fake(folder: Path, name: str) -> Path:

@@ -211,7 +211,9 @@ def _may_touch(shape: Shape, surface: bool, touch_depth: float) -> Shape | None:
     """
     hull = convex_hull(shape)
     if hull.is_mesh:
-        raise GraspAtlasError(f"the collision mesh '{shape.name}' touches the object and is flat; give it some thickness")
+        raise GraspAtlasError(
+            f"the collision mesh '{shape.name}' touches the object and is flat; give it some thickness"
+        )
     return thinner(hull, touch_depth) if surface else hull
 
 

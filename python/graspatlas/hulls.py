@@ -94,9 +94,7 @@ def _above(points: Array, planes: Array) -> tuple[Array, NDArray[np.intp]]:
     return heights, highest
 
 
-def _farthest(
-    points: Array, waiting: NDArray[np.intp], planes: Array
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _farthest(points: Array, waiting: NDArray[np.intp], planes: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Which of the waiting points still lie above faces, and of these the one that is highest above each face."""
     heights, highest = _above(points[waiting], planes)
     left = heights > ENOUGH
