@@ -217,7 +217,7 @@ void bind_collision(py::module_& module) {
           py::gil_scoped_release release;
           shapes = read_collision_shapes(tree, urdf, package_dirs);
         }
-        py::list out;
+        py::typing::List<py::typing::Dict<py::str, py::object>> out;
         for (const LinkShape& shape : shapes) out.append(table_of(shape));
         return out;
       },

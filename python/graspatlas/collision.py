@@ -185,7 +185,7 @@ class _Pair:
 def _joined(
     problem: Problem, object_joint: int, touch_depth: float, clearance: float
 ) -> tuple[list[Shape], list[_Pair]]:
-    """Shapes of hand and object, and the pairs to look at: those in the hand, then those of each shape of the object."""
+    """Shapes of hand and object, and the pairs to look at: those in the hand, then those with the object."""
     shapes = _shapes(problem.hand, problem.hand.tree)
     in_hand = list(enumerate(shapes))
     pairs = [_Pair(a, b, clearance) for a, b in _hand_pairs(shapes, problem.hand)]
@@ -205,7 +205,7 @@ def _joined(
 
 
 def _may_touch(shape: Shape, surface: bool, touch_depth: float) -> Shape | None:
-    """A stand-in for a link's shape, where coal knows no depth of the pair: its hull, thinner where it meets a surface.
+    """A stand-in for a link's shape, where coal knows no depth of the pair: its hull, thinner where it meets a mesh.
 
     None when nothing is left of it.
     """

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,17 +28,13 @@ Array = NDArray[np.float64]
 CONVEX = 1e-3
 
 
-def _none(dtype: type) -> Any:
-    return field(default_factory=lambda: np.zeros((0, 3), dtype))
-
-
 @dataclass(frozen=True, eq=False)
 class Shape:
     """A collision shape, and what carries it.
 
     Attributes:
-        kind: ``"sphere"``, ``"capsule"``, ``"cylinder"``, ``"box"`` about the origin, with axes along z; ``"convex"`` or
-            ``"mesh"``.
+        kind: ``"sphere"``, ``"capsule"``, ``"cylinder"`` or ``"box"`` about the origin, with its axis along z;
+            ``"convex"`` or ``"mesh"``.
         sizes: Radius; radius and distance of the ends' centres; radius and length; edges [m].
         points: Corners of a convex solid or mesh [n, 3], metres.
         triangles: Corners of each triangle of a mesh [t, 3].
@@ -53,8 +48,8 @@ class Shape:
 
     kind: str
     sizes: Sequence[float] = (0.0, 0.0, 0.0)
-    points: Array = _none(float)
-    triangles: NDArray[np.int32] = _none(np.int32)
+    points: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    triangles: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 3), np.int32))
     name: str = ""
     link: str = ""
     joint: int = 0
@@ -89,7 +84,7 @@ def read_shapes(tree: str, urdf: str, package_dirs: Sequence[str]) -> list[Shape
 def convex_solid(shape: Shape) -> Shape:
     """The convex solid that a mesh bounds; the shape itself when it is no mesh, or is not convex or not closed."""
     if shape.kind == "convex":
-        return _hull_of(shape, shape)
+        return _hull_of(shape) or shape
     if not shape.is_mesh:
         return shape
     hull = convex_hull(shape)
@@ -98,7 +93,7 @@ def convex_solid(shape: Shape) -> Shape:
 
 def convex_hull(shape: Shape) -> Shape:
     """Convex hull of a mesh; the shape itself when it is no mesh, or so flat that it has no hull."""
-    return _hull_of(shape, shape) if shape.is_mesh else shape
+    return (_hull_of(shape) or shape) if shape.is_mesh else shape
 
 
 def thinner(shape: Shape, depth: float) -> Shape | None:
@@ -134,15 +129,15 @@ def _thinner_solid(shape: Shape, depth: float) -> Shape | None:
     if not deepest.success or deepest.x[3] <= 0.0:
         return None
     left = replace(shape, points=HalfspaceIntersection(planes, deepest.x[:3]).intersections)
-    return _hull_of(left, None)
+    return _hull_of(left)
 
 
-def _hull_of(shape: Shape, otherwise: Any) -> Any:
-    """Convex hull of a shape's points, thinned where they are many; `otherwise` when they have no volume."""
+def _hull_of(shape: Shape) -> Shape | None:
+    """Convex hull of a shape's points, thinned where they are many; None when they have no volume."""
     try:
         corners, error = corners_of_hull(np.asarray(shape.points, float))
     except (QhullError, ValueError):
-        return otherwise
+        return None
     error += shape.error
     return replace(shape, kind="convex", points=corners, triangles=np.zeros((0, 3), np.int32), error=error)
 

@@ -63,7 +63,7 @@ def _chosen(points: Array) -> NDArray[np.intp]:
         chosen = chosen[hull.vertices]
         waiting, more = _farthest(points, waiting, hull.equations)
         if len(more) == 0 or len(chosen) >= MOST_CORNERS:
-            return chosen
+            return np.asarray(chosen, np.intp)
         chosen = np.union1d(chosen, more)
 
 
@@ -79,7 +79,7 @@ def _outermost(points: Array) -> NDArray[np.intp]:
     try:
         ConvexHull(points[found])
     except (QhullError, ValueError):  # all in one plane, but the points are not
-        return ConvexHull(points).vertices.astype(np.intp)
+        return np.asarray(ConvexHull(points).vertices, np.intp)
     return np.asarray(found, np.intp)
 
 
@@ -111,7 +111,7 @@ def mesh_volume(points: Array, triangles: NDArray[np.int32]) -> float:
 
 
 def shallow_volume(points: Array, triangles: NDArray[np.int32], planes: Array) -> float:
-    """Volume between a mesh and the planes of a hull round it, where it lies shallow below them [m^3]; from a sample."""
+    """Volume between a mesh and the planes of a hull round it, where they are close [m^3]; from a sample."""
     step = 1 + len(triangles) // MANY_POINTS
     a, b, c = (points[corners] for corners in triangles[::step].T)
     areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)

@@ -1,4 +1,4 @@
-"""Loads the compiled core, and says what is in the way when another installation's libraries take the place of its own."""
+"""Loads the compiled core, and says what is in the way when libraries of another installation take its own's place."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def _load() -> None:
             raise
         names = ", ".join(map(str, others))
         raise ImportError(
-            f"graspatlas cannot load its own Pinocchio and coal because of {names}: import graspatlas before what loads "
-            f"these, or take their folder from LD_LIBRARY_PATH ({' '.join(str(error).split())})"
+            f"graspatlas cannot load its own Pinocchio and coal because of {names}: import graspatlas before what "
+            f"loads these, or take their folder from LD_LIBRARY_PATH ({' '.join(str(error).split())})"
         ) from None
 
 
