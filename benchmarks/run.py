@@ -16,6 +16,7 @@ import numpy as np
 
 import graspatlas as ga
 from graspatlas import _core
+from graspatlas.collision import CollisionChecker
 
 REPEATS = 7
 
@@ -54,6 +55,8 @@ def grasp_rows(name: str, dimension: int, radius: float) -> None:
         "min_weight",
     ):
         index_row(index, problem, atlas)
+    if dimension == 2:
+        collision_row(problem, atlas)
 
 
 def index_row(index: str, problem: ga.Problem, atlas: ga.Atlas) -> None:
@@ -63,6 +66,14 @@ def index_row(index: str, problem: ga.Problem, atlas: ga.Atlas) -> None:
     )
     each, best = 1e6 * seconds / len(values), values.max()
     print(f"{'  ' + index:32} {len(values):7d} grasps {1e3 * seconds:9.1f} ms {each:9.2f} us each   best {best:.6g}")
+
+
+def collision_row(problem: ga.Problem, atlas: ga.Atlas) -> None:
+    """Time the collision check of all charts of an atlas, on all cores, and print a row."""
+    checker = CollisionChecker(problem)
+    seconds, free = median_seconds(lambda: checker.free(atlas.centers))
+    each = 1e6 * seconds / len(free)
+    print(f"{'  collisions':32} {len(free):7d} grasps {1e3 * seconds:9.1f} ms {each:9.2f} us each   {free.sum()} free")
 
 
 def thread_row(name: str, dimension: int, radius: float, threads: int) -> None:

@@ -28,4 +28,5 @@ PYBIND11_MODULE(_core, module) {
   graspatlas::bind_atlas(module);
   graspatlas::bind_grasp(module);
   graspatlas::bind_quality(module);
+  graspatlas::bind_collision(module);
 }

@@ -5,7 +5,7 @@ from graspatlas import start_up as start_up  # first: the others take a second  
 import importlib
 import typing
 
-from graspatlas import motions, patches, quality, systems
+from graspatlas import libraries, motions, patches, quality, systems  # noqa: F401  (libraries first: it loads the compiled core)
 from graspatlas.atlas import Atlas, Closed, Status
 from graspatlas.components import Components, SearchStatus, find_components
 from graspatlas.contacts import Contact

@@ -13,6 +13,7 @@ __all__: list[str] = [
     "AnySystem",
     "AtlasBuilder",
     "BSplinePatch",
+    "CollisionBatch",
     "ContactSide",
     "CurvePatch",
     "EllipsoidPatch",
@@ -33,11 +34,13 @@ __all__: list[str] = [
     "Torus",
     "TorusPatch",
     "ball_radii",
+    "distances_from_hull",
     "force_closure_margins",
     "force_closure_slacks",
     "hull_volumes",
     "min_weights",
     "project",
+    "read_collision_shapes",
     "round_ball_radii",
     "semi_axes",
 ]
@@ -526,11 +529,71 @@ class GraspSystem(AnySystem):
         Degrees of freedom of the object.
         """
 
+class CollisionBatch:
+    """
+    Collision shapes of hand and object; safe to call from any number of threads.
+    """
+    def __init__(
+        self,
+        model: Model,
+        shapes: collections.abc.Sequence[
+            tuple[
+                str,
+                str,
+                typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+                typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+                typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+                typing.SupportsInt | typing.SupportsIndex,
+                typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
+            ]
+        ],
+        pairs: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+        required: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> None:
+        """
+        From shapes (name, kind, sizes [3], points [n x 3], triangles [t x 3], joint, placement [4 x 4]), pairs of them [p x 2] and the distances that the pairs must keep [p]; see collision_scene.hpp.
+        """
+    def first_hits(
+        self, X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        First pair of each grasp that does not, or -1 [n].
+        """
+    def free(self, X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        Whether all pairs of each grasp keep their distances [n].
+        """
+    def nearest(
+        self,
+        X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        pairs: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+    ) -> dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]]:
+        """
+        Distances [n x p], and on_first, on_second and normals [n x p x 3] of pairs; see NearestPoints.
+        """
+    def point_distances(
+        self,
+        X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        shapes: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+        points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Distance of each point [palm] from the nearest of some shapes [n x points].
+        """
+
 def ball_radii(
     wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Radius of the largest ball around the origin in the hull of each grasp's wrenches [n x points x 3 or 6]; see wrench_hull.hpp.
+    """
+
+def distances_from_hull(
+    points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    corners: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Distance of each point from the convex hull of others, 0 inside [n].
     """
 
 def force_closure_margins(
@@ -575,6 +638,13 @@ def project(
 ) -> typing.Any:
     """
     Point of the manifold above u in the tangent space at x (eqs 14 and 15); None when Newton does not converge.
+    """
+
+def read_collision_shapes(
+    tree: str, urdf: str, package_dirs: collections.abc.Sequence[str]
+) -> list[dict[str, typing.Any]]:
+    """
+    Collision shapes of a URDF, each a table; see collision_shape.hpp.
     """
 
 def round_ball_radii(

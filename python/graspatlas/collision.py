@@ -1,17 +1,19 @@
-"""Collisions of hand and object, by coal through Pinocchio."""
+"""Collisions of hand and object, by coal in the compiled core."""
 
 from __future__ import annotations
 
-import os
 import sys
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
-from graspatlas.collision_shapes import convex_hull, convex_solid, is_mesh, thinner
+from graspatlas import _core
+from graspatlas.collision_shapes import Shape, convex_hull, convex_solid, read_shapes, thinner
 from graspatlas.errors import GraspAtlasError
 from graspatlas.mesh_files import check_meshes
 
@@ -19,19 +21,37 @@ if TYPE_CHECKING:
     from graspatlas.hand import Body
     from graspatlas.problem import Problem
 
-__all__ = ["CollisionChecker"]
+__all__ = ["CollisionChecker", "Nearest"]
+
+Array = NDArray[np.float64]
 
 #: Before the names of the object's shapes.
 OBJECT = "object/"
-#: After the names of shapes that are thinner than those of the hand.
-THINNER = "/thinner"
-#: Distances are as exact as this, so that optimisers can differentiate them; depths are not [m].
-DISTANCE_TOLERANCE = 1e-10
-#: Radius of the ball that stands for a point [m].
-DOT = 1e-6
-#: Grasps are checked in batches of this size, on all cores, unless there are very few.
+#: Grasps are checked in batches of this size, on all cores.
 BATCH = 2048
-SMALLEST_BATCH = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """Where pairs of shapes are nearest, or deepest in each other, for n grasps and p pairs.
+
+    A change of x that moves the first shape's point by da and the second's by db changes the distance by
+    normal . (db - da), where the points are unique. Where two meshes cut each other points and normals are NaN.
+
+    Attributes:
+        pairs: Names of the shapes [p].
+        distances: Signed distances [n, p], metres: negative is the depth of a collision; meshes that are no solids have
+            none.
+        on_first: The point on the first shape, in the palm's frame [n, p, 3], metres.
+        on_second: The point on the second shape [n, p, 3], metres.
+        normals: Unit vectors along which the second shape gets away from the first [n, p, 3], in the palm's frame.
+    """
+
+    pairs: tuple[tuple[str, str], ...]
+    distances: Array
+    on_first: Array
+    on_second: Array
+    normals: Array
 
 
 class CollisionChecker:
@@ -40,37 +60,36 @@ class CollisionChecker:
     Pairs of links that the hand's SRDF lists may touch. The links that carry a contact touch the object; they may sink
     into it by `touch_depth`, since a collision shape only approximates the surface. Meshes that bound a convex solid
     are solid. Other meshes of a link with a contact count by their convex hulls where they meet the object; those of an
-    object are surfaces, and what touches them is made thinner by `touch_depth`.
+    object are surfaces, and what touches them is made thinner by `touch_depth`. Hulls with more than some 250 corners
+    are thinned, to 0.1 mm; `thinned` tells which.
+
+    Any number of threads may use one checker. Answers are functions of the grasp alone.
 
     Args:
         problem: The problem; hand and object need collision shapes.
         touch_depth: Depth to which a touching link may sink into the object [m].
         clearance: Distance that all other pairs must keep [m].
 
+    Attributes:
+        pairs: Names of the shapes of each pair that is looked at [p].
+        required: Distance that each pair must keep, less what it may sink in [p], metres.
+        thinned: How far the hulls that were thinned reach beyond what is left of them, by the shapes' names [m].
+
     Raises:
-        GraspAtlasError: If hand or object has no collision shape, or a mesh cannot be read.
+        GraspAtlasError: If hand or object has no collision shape, or a mesh or the SRDF cannot be read.
     """
 
     def __init__(self, problem: Problem, touch_depth: float = 0.002, clearance: float = 0.0) -> None:
-        import coal
-        import pinocchio as pin
-
-        self._pin = pin
-        self._model, self._geometry = _joined(problem, touch_depth)
-        self._data = self._model.createData()
-        self._geometry_data = pin.GeometryData(self._geometry)
-        touching = _touching_joints(self._model, problem)
-        for i, pair in enumerate(self._geometry.collisionPairs):
-            shapes = [self._geometry.geometryObjects[s] for s in (pair.first, pair.second)]
-            in_object = [shape.name.startswith(OBJECT) for shape in shapes]
-            touches = in_object == [False, True] and shapes[0].parentJoint in touching
-            request = coal.CollisionRequest()
-            depth = 0.0 if shapes[0].name.endswith(THINNER) else touch_depth
-            request.security_margin = -depth if touches else clearance
-            self._geometry_data.collisionRequests[i] = request
-            self._geometry_data.distanceRequests[i].gjk_tolerance = DISTANCE_TOLERANCE
-        pairs = range(len(self._geometry.collisionPairs))
-        self._required = np.array([self._geometry_data.collisionRequests[i].security_margin for i in pairs])
+        self._hand = problem.hand
+        model = _core.Model(problem.hand.tree, problem.object_joint)
+        shapes, pairs = _joined(problem, model.object_joint, touch_depth, clearance)
+        self._shapes = tuple(shapes)
+        self._size = model.q_size
+        self.pairs = tuple((shapes[pair.first].name, shapes[pair.second].name) for pair in pairs)
+        self.required: Array = np.array([pair.required for pair in pairs])
+        self.thinned = {shape.name: shape.error for shape in shapes if shape.error > 0.0}
+        numbers = np.array([(pair.first, pair.second) for pair in pairs], np.int32).reshape(-1, 2)
+        self._core = _core.CollisionBatch(model, [shape.as_tuple() for shape in shapes], numbers, self.required)
 
     def first_collision(self, x: ArrayLike) -> tuple[str, str] | None:
         """Names of the first two shapes found in collision at a grasp, or None.
@@ -78,15 +97,8 @@ class CollisionChecker:
         Args:
             x: The grasp [configuration_size].
         """
-        q = np.asarray(x, float)[: self._model.nq]
-        hit = self._pin.computeCollisions(self._model, self._data, self._geometry, self._geometry_data, q, True)
-        if not hit:
-            return None
-        for pair, result in zip(self._geometry.collisionPairs, self._geometry_data.collisionResults, strict=True):
-            if result.isCollision():
-                first, second = (self._geometry.geometryObjects[i].name for i in (pair.first, pair.second))
-                return first.removesuffix(THINNER), second
-        return None
+        (hit,) = self._core.first_hits(self._rows(np.asarray(x, float)[None]))
+        return None if hit < 0 else self.pairs[hit]
 
     def free(self, X: ArrayLike) -> NDArray[np.bool_]:
         """Whether each grasp is free of collision [n].
@@ -94,48 +106,40 @@ class CollisionChecker:
         Args:
             X: One grasp a row [n, configuration_size].
         """
-        rows = np.asarray(X, float)[:, : self._model.nq]
-        if len(rows) < SMALLEST_BATCH:
-            args = self._model, self._data, self._geometry, self._geometry_data
-            return np.array([not self._pin.computeCollisions(*args, q, True) for q in np.ascontiguousarray(rows)], bool)
+        rows = self._rows(X)
         out = np.empty(len(rows), bool)
         bar = tqdm(total=len(rows), desc="collisions", unit=" grasps", delay=1.0, disable=not sys.stderr.isatty())
         with bar:
             for start in range(0, len(rows), BATCH):
-                batch = np.asfortranarray(rows[start : start + BATCH].T)
-                threads = len(os.sched_getaffinity(0))
-                hits = self._pin.computeCollisionsInParallel(threads, self._pool, batch, True, False)
-                out[start : start + BATCH] = ~np.asarray(hits, bool)
-                bar.update(batch.shape[1])
+                batch = rows[start : start + BATCH]
+                out[start : start + BATCH] = self._core.free(batch)
+                bar.update(len(batch))
         return out
 
-    @cached_property
-    def _pool(self) -> Any:
-        """Copies of the geometry, one for each thread."""
-        size = len(os.sched_getaffinity(0))
-        pool = self._pin.GeometryPool(self._model, self._geometry, size)
-        for i in range(size):
-            for pair, request in enumerate(self._geometry_data.collisionRequests):
-                pool.getGeometryData(i).collisionRequests[pair] = request
-        return pool
-
-    def clearances(self, X: ArrayLike, pairs: ArrayLike | None = None) -> NDArray[np.float64]:
+    def clearances(self, X: ArrayLike, pairs: ArrayLike | None = None) -> Array:
         """Distance of each pair of shapes, less the distance that it must keep; negative in collision [n, p], metres.
 
         Args:
             X: One grasp a row [n, configuration_size].
-            pairs: Numbers of the pairs [p], in the order of the collision geometry; all by default.
+            pairs: Numbers of the pairs [p], in the order of the attribute `pairs`; all by default.
         """
-        chosen = np.arange(len(self._required)) if pairs is None else np.asarray(pairs, int)
-        rows = np.ascontiguousarray(np.asarray(X, float)[:, : self._model.nq])
-        data, geometry_data, distance = self._data, self._geometry_data, self._pin.computeDistance
-        out = np.empty((len(rows), len(chosen)))
-        for row, q in zip(out, rows, strict=True):
-            self._pin.updateGeometryPlacements(self._model, data, self._geometry, geometry_data, q)
-            row[:] = [distance(self._geometry, geometry_data, int(pair)).min_distance for pair in chosen]
-        return np.asarray(out - self._required[chosen])
+        chosen = self._chosen(pairs)
+        return np.asarray(self._core.nearest(self._rows(X), chosen)["distances"] - self.required[chosen])
 
-    def depths(self, x: ArrayLike, frame: str | None, points: ArrayLike) -> NDArray[np.float64]:
+    def nearest(self, X: ArrayLike, pairs: ArrayLike | None = None) -> Nearest:
+        """Signed distance, nearest points and normal of pairs of shapes.
+
+        Distances of shapes that are apart are exact to 1e-10 m, depths to 1e-6 m.
+
+        Args:
+            X: One grasp a row [n, configuration_size].
+            pairs: Numbers of the pairs [p], in the order of the attribute `pairs`; all by default.
+        """
+        chosen = self._chosen(pairs)
+        found = self._core.nearest(self._rows(X), chosen)
+        return Nearest(tuple(self.pairs[i] for i in chosen), **found)
+
+    def depths(self, x: ArrayLike, frame: str | None, points: ArrayLike) -> Array:
         """How far points are from the collision shapes of a link or of the object, at a grasp.
 
         Args:
@@ -147,95 +151,108 @@ class CollisionChecker:
             Distance of each point from the nearest shape [n], metres: negative inside, but for meshes that are not
             convex, and infinite where there is no shape.
         """
-        import coal
+        joint = None if frame is None else self._hand.frame(frame)[0]
+        chosen = [
+            i
+            for i, shape in enumerate(self._shapes)
+            if (_in_object(shape) if joint is None else not _in_object(shape) and shape.joint == joint)
+        ]
+        rows, at = self._rows(np.asarray(x, float)[None]), np.atleast_2d(np.asarray(points, float))
+        return np.asarray(self._core.point_distances(rows, np.array(chosen, np.int32), at)[0])
 
-        q = np.asarray(x, float)[: self._model.nq]
-        self._pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._geometry_data, q)
-        joint = None if frame is None else self._model.frames[self._model.getFrameId(frame)].parentJoint
-        dot, request = coal.Sphere(DOT), coal.DistanceRequest()
-        out = np.full(len(np.atleast_2d(points)), np.inf)
-        for shape, placement in zip(self._geometry.geometryObjects, self._geometry_data.oMg, strict=True):
-            in_object = shape.name.startswith(OBJECT)
-            if in_object if joint is None else not in_object and shape.parentJoint == joint:
-                at = coal.Transform3s(placement.rotation, placement.translation)
-                for i, point in enumerate(np.atleast_2d(points)):
-                    here = coal.Transform3s(np.eye(3), np.asarray(point, float))
-                    gap = coal.distance(dot, here, shape.geometry, at, request, coal.DistanceResult())
-                    out[i] = min(out[i], gap + DOT)
-        return out
+    def _rows(self, X: ArrayLike) -> Array:
+        """The configurations in grasps, one a row."""
+        rows = np.asarray(X, float)
+        if rows.ndim != 2 or rows.shape[1] < self._size:
+            raise GraspAtlasError(
+                f"grasps must be an array [n, configuration_size] with at least {self._size} columns; "
+                f"its shape is {rows.shape}"
+            )
+        return np.ascontiguousarray(rows[:, : self._size])
 
-
-def _joined(problem: Problem, touch_depth: float) -> tuple[Any, Any]:
-    """Model and collision geometry of hand and object in one; the object's shapes sit on the joint named object."""
-    import pinocchio as pin
-
-    model = pin.buildModelFromXML(problem.hand.tree)
-    geometry = _shapes(problem.hand, model)
-    if problem.hand.srdf:
-        geometry.addAllCollisionPairs()
-        pin.removeCollisionPairsFromXML(model, geometry, problem.hand.srdf)
-    else:
-        geometry.addAllCollisionPairs()
-        _drop_adjacent(model, geometry)
-    touching = _touching_joints(model, problem)
-    in_hand = list(enumerate(geometry.geometryObjects.tolist()))
-    joint = pin.JointModelFreeFlyer() if problem.object_joint == "free_flyer" else pin.JointModelPlanar()
-    object_joint = model.addJoint(0, joint, pin.SE3.Identity(), "object")
-    body = _shapes(problem.object, pin.buildModelFromXML(problem.object.urdf))
-    for shape in body.geometryObjects:
-        placed = pin.GeometryObject(OBJECT + shape.name, object_joint, 0, shape.placement, shape.geometry)
-        index = geometry.addGeometryObject(placed)
-        for other, of_link in in_hand:
-            may_touch = of_link.parentJoint in touching and (is_mesh(of_link.geometry) or is_mesh(shape.geometry))
-            added = _may_touch(of_link, is_mesh(shape.geometry), touch_depth) if may_touch else of_link
-            if added is not None:
-                first = geometry.addGeometryObject(added) if may_touch else other
-                geometry.addCollisionPair(pin.CollisionPair(first, index))
-    return model, geometry
+    def _chosen(self, pairs: ArrayLike | None) -> NDArray[np.int32]:
+        return np.arange(len(self.pairs), dtype=np.int32) if pairs is None else np.asarray(pairs, np.int32)
 
 
-def _may_touch(shape: Any, surface: bool, touch_depth: float) -> Any | None:
-    """A stand-in for a link's shape, where coal knows no depth of the pair: its hull, thinner where it meets a surface.
+@dataclass(frozen=True)
+class _Pair:
+    """Numbers of two shapes, and the distance that they must keep [m]."""
+
+    first: int
+    second: int
+    required: float
+
+
+def _joined(
+    problem: Problem, object_joint: int, touch_depth: float, clearance: float
+) -> tuple[list[Shape], list[_Pair]]:
+    """Shapes of hand and object, and the pairs to look at: those in the hand, then those with the object."""
+    shapes = _shapes(problem.hand, problem.hand.tree)
+    in_hand = list(enumerate(shapes))
+    pairs = [_Pair(a, b, clearance) for a, b in _hand_pairs(shapes, problem.hand)]
+    touching = {problem.hand.frame(contact.frame)[0] for contact in problem.contacts}
+    for shape in _shapes(problem.object, problem.object.urdf):
+        second = len(shapes)
+        shapes.append(replace(shape, name=OBJECT + shape.name, joint=object_joint))
+        for first, of_link in in_hand:
+            if of_link.joint not in touching:
+                pairs.append(_Pair(first, second, clearance))
+            elif not (of_link.is_mesh or shape.is_mesh):
+                pairs.append(_Pair(first, second, -touch_depth))
+            elif (stand_in := _may_touch(of_link, shape.is_mesh, touch_depth)) is not None:
+                pairs.append(_Pair(len(shapes), second, 0.0 if shape.is_mesh else -touch_depth))
+                shapes.append(stand_in)
+    return shapes, pairs
+
+
+def _may_touch(shape: Shape, surface: bool, touch_depth: float) -> Shape | None:
+    """A stand-in for a link's shape, where coal knows no depth of the pair: its hull, thinner where it meets a mesh.
 
     None when nothing is left of it.
     """
-    import pinocchio as pin
-
-    hull, name = convex_hull(shape.geometry), shape.name
-    if is_mesh(hull):
-        raise GraspAtlasError(f"the collision mesh '{name}' touches the object and is flat; give it some thickness")
-    if surface:
-        hull, name = thinner(hull, touch_depth), name + THINNER
-    return None if hull is None else pin.GeometryObject(name, shape.parentJoint, 0, shape.placement, hull)
+    hull = convex_hull(shape)
+    if hull.is_mesh:
+        raise GraspAtlasError(
+            f"the collision mesh '{shape.name}' touches the object and is flat; give it some thickness"
+        )
+    return thinner(hull, touch_depth) if surface else hull
 
 
-def _shapes(body: Body, model: Any) -> Any:
-    import pinocchio as pin
+def _in_object(shape: Shape) -> bool:
+    return shape.name.startswith(OBJECT)
 
+
+def _shapes(body: Body, tree: str) -> list[Shape]:
+    """Collision shapes of a body, convex meshes as solids."""
     check_meshes(body)
     try:
-        geometry = pin.buildGeomFromUrdfString(model, body.urdf, pin.COLLISION, package_dirs=list(body.package_dirs))
-    except (ValueError, RuntimeError) as error:
-        reason = " ".join(str(error).rpartition("message: ")[2].split())
+        shapes = read_shapes(tree, body.urdf, body.package_dirs)
+    except GraspAtlasError as error:
+        reason = " ".join(str(error).split())
         raise GraspAtlasError(f"collision shapes of '{body.name}' cannot be read: {reason}") from None
-    if geometry.ngeoms == 0:
+    if not shapes:
         raise GraspAtlasError(f"'{body.name}' has no collision shape; give its URDF <collision> elements")
-    for shape in geometry.geometryObjects:
-        shape.geometry = convex_solid(shape.geometry)
-    return geometry
+    return [convex_solid(shape) for shape in shapes]
 
 
-def _drop_adjacent(model: Any, geometry: Any) -> None:
-    """Without an SRDF, shapes of one joint and of parent and child joints may touch."""
-    import pinocchio as pin
+def _hand_pairs(shapes: list[Shape], hand: Body) -> Iterator[tuple[int, int]]:
+    """Pairs of the hand's shapes that must not touch; without an SRDF those of neighbouring joints may."""
+    may_touch = _disabled(hand)
+    for i, a in enumerate(shapes):
+        for j, b in enumerate(shapes[i + 1 :], i + 1):
+            neighbours = not hand.srdf and (a.parent_joint == b.joint or b.parent_joint == a.joint)
+            if a.joint != b.joint and not neighbours and frozenset((a.link, b.link)) not in may_touch:
+                yield i, j
 
-    copies = [pin.CollisionPair(pair.first, pair.second) for pair in geometry.collisionPairs]  # removing moves them
-    for pair in copies:
-        a, b = (geometry.geometryObjects[i].parentJoint for i in (pair.first, pair.second))
-        if a == b or model.parents[a] == b or model.parents[b] == a:
-            geometry.removeCollisionPair(pair)
 
-
-def _touching_joints(model: Any, problem: Problem) -> set[int]:
-    """Joints that carry a link with a contact."""
-    return {model.frames[model.getFrameId(contact.frame)].parentJoint for contact in problem.contacts}
+def _disabled(hand: Body) -> set[frozenset[str]]:
+    """Pairs of links that the hand's SRDF lists."""
+    if not hand.srdf:
+        return set()
+    try:
+        elements = ElementTree.fromstring(hand.srdf).iter("disable_collisions")
+        return {frozenset((element.attrib["link1"], element.attrib["link2"])) for element in elements}
+    except ElementTree.ParseError as error:
+        raise GraspAtlasError(f"the SRDF of '{hand.name}' is not XML: {error}") from None
+    except KeyError as error:
+        raise GraspAtlasError(f"a disable_collisions element in the SRDF of '{hand.name}' has no {error}") from None

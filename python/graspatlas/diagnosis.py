@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from graspatlas.atlas import Status
 from graspatlas.collision import CollisionChecker
 from graspatlas.errors import GraspAtlasError
+from graspatlas.hulls import LARGEST_ERROR
 from graspatlas.optimizer import build_atlas
 from graspatlas.problem import Problem
 from graspatlas.search import with_first_grasp
@@ -291,6 +292,8 @@ def _shapes(problem: Problem) -> Iterator[Finding]:
         checker = CollisionChecker(problem)
     except GraspAtlasError:
         return  # which the next finding says
+    if checker.thinned:
+        yield _thinned(checker.thinned)
     x = problem.x1_array
     arrays = problem.full_system.grasp_arrays(x[None])
     largest, faults = 0.0, []
@@ -311,6 +314,14 @@ def _shapes(problem: Problem) -> Iterator[Finding]:
     else:
         text = f"contact points lie on the collision shapes, to {1000.0 * largest:.2f} mm"
         yield Finding(OK, "shapes at x1", text, "what touches is what collides")
+
+
+def _thinned(thinned: Mapping[str, float]) -> Finding:
+    """Hulls that collide with fewer corners than their meshes have."""
+    largest = max(thinned.values())
+    text = f"thinned, to {1000.0 * largest:.2f} mm: {', '.join(thinned)}"
+    hint = "these hulls have more corners than collisions need; simpler meshes would be read faster"
+    return Finding(OK if largest <= LARGEST_ERROR else NOTE, "collision hulls", text, hint)
 
 
 def _collision(problem: Problem) -> Finding:

@@ -92,9 +92,7 @@ def build_atlas(
         deadline=start + _seconds(max_seconds),
         memory=available_bytes() if max_bytes is None else _positive("max_bytes", max_bytes),
     )
-    workers = available_threads() if threads is None else _whole("threads", threads, MOST_THREADS)
-    workers = min(workers, max(ALWAYS_ALLOWED, THREADS_A_CORE * available_threads()))
-    return _grown(system, _numbers("x0", x0), (*options, workers), limits, checkpoint, progress)
+    return _grown(system, _numbers("x0", x0), (*options, _workers(threads)), limits, checkpoint, progress)
 
 
 def _grown(
@@ -225,8 +223,7 @@ def optimize(
             memory=available_bytes() if max_bytes is None else _positive("max_bytes", max_bytes),
             seconds_each=0.0 if max_seconds is None else reading.seconds_each(problem, system, x0),
         )
-        workers = available_threads() if threads is None else _whole("threads", threads)
-        sizes = (_positive("radius", options["radius"]), _positive("epsilon", options["epsilon"]), workers)
+        sizes = (_positive("radius", options["radius"]), _positive("epsilon", options["epsilon"]), _workers(threads))
         atlas = _grown(system, x0, sizes, limits, checkpoint, progress)
     else:
         check_atlas_of(problem, options, atlas)
@@ -279,6 +276,13 @@ def _positive(name: str, value: float) -> float:
 
 def _seconds(max_seconds: float | None) -> float:
     return float("inf") if max_seconds is None else _positive("max_seconds", max_seconds)
+
+
+def _workers(threads: int | None) -> int:
+    """Threads to start."""
+    if threads is None:
+        return available_threads()
+    return min(_whole("threads", threads, MOST_THREADS), max(ALWAYS_ALLOWED, THREADS_A_CORE * available_threads()))
 
 
 def _whole(name: str, value: int, most: int | None = None) -> int:

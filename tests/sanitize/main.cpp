@@ -12,7 +12,7 @@ int main() {
       {"polytopes", strain::polytopes}, {"neighbours", strain::neighbours}, {"atlases", strain::atlases},
       {"misuse", strain::misuse},       {"users", strain::users},
 #ifdef GRASPATLAS_WITH_GRASPS
-      {"grasps", strain::grasps},
+      {"grasps", strain::grasps},       {"collisions", strain::collisions},
 #endif
   };
   for (const auto& [name, run] : parts) {

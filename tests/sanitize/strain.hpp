@@ -63,6 +63,7 @@ class Random {
 };
 
 void atlases();
+void collisions();
 void grasps();
 void misuse();
 void neighbours();
