@@ -275,7 +275,9 @@ def _refinement_checks(result: Result, refinement: Refinement) -> Iterator[Check
     grasps = Grasps(problem, refinement.x, system)
     if result.quality in INDICES:
         again = evaluate(result.quality, grasps)
-        error = np.abs(again - refinement.qualities) / np.maximum(np.abs(again), 1e-12)
+        with np.errstate(invalid="ignore"):
+            error = np.abs(again - refinement.qualities) / np.maximum(np.abs(again), 1e-12)
+        error[again == refinement.qualities] = 0.0  # both may be infinite
         yield Check("refined qualities differ from a new evaluation by, relatively", float(error.max()), 1e-6)
     loss = float(result.best.quality - refinement.qualities.max())
     yield Check("the refined best is worse than the best chart by", loss, 0.0)

@@ -11,7 +11,7 @@ grasp". This module lets you test that on your own result::
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +25,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasps
 from graspatlas.quality import Quality, evaluate
 from graspatlas.requirements import Require, Requirement, screen
+from graspatlas.runaways import climbs_a_needle, followed, is_sharp, levels_around, never_levels_off
 from graspatlas.tables import number_array, shown
 
 if TYPE_CHECKING:
@@ -95,13 +96,17 @@ class Climb:
         chart: Chart at whose centre it started; -1 when it started elsewhere.
         x: Where it ended [configuration_size].
         qualities: The index at the start and after each step; never decreasing.
-        converged: False when it was given up after the largest number of steps.
+        converged: True when it ended at a maximum; False when it was given up after the largest number of steps, or ran
+            after an index that has no maximum there.
+        unbounded: True when the index grows without bound where it went, as far as numbers can tell; see
+            :mod:`graspatlas.runaways`.
     """
 
     chart: int
     x: Array
     qualities: Array
     converged: bool
+    unbounded: bool = False
 
     @property
     def quality(self) -> float:
@@ -120,13 +125,14 @@ def climb(result: Result, start: int | ArrayLike, *, all_motions: bool = False, 
     In the tangent space of the current grasp, SLSQP of SciPy maximises the index of the projected point over the
     tangent coordinates, in a box as wide as the chart radius. Its result becomes the next grasp if it is better; if
     not, the best of a ring of points does; if none is better, the box shrinks. The climb ends when the box is a
-    thousandth of the radius.
+    thousandth of the radius. Where it ends the index is looked at on ever smaller rings, which tell a maximum from an
+    index that grows without bound.
 
     Args:
         result: The result; its index may be any callable.
         start: Number of the chart at whose centre to start, or a grasp [configuration_size].
         all_motions: Climb in all t dimensions of F, no hand motion frozen but the couplings, instead of in R.
-        max_steps: Steps after which the climb is given up: an index without bound is climbed for ever.
+        max_steps: Steps after which the climb is given up.
 
     Returns:
         The climb.
@@ -154,7 +160,7 @@ def climb(result: Result, start: int | ArrayLike, *, all_motions: bool = False, 
     value = float(evaluate(result.quality, hill.grasps(x))[0])
     reach = hill.radius
     qualities = [value]
-    while reach > SMALLEST_REACH * hill.radius and len(qualities) <= max_steps:
+    while reach > SMALLEST_REACH * hill.radius and len(qualities) <= max_steps and value < np.inf:
         place = _Surroundings(hill, x, value, reach)
         better = place.optimised() or place.best_of_ring()
         if better is None:
@@ -162,7 +168,28 @@ def climb(result: Result, start: int | ArrayLike, *, all_motions: bool = False, 
             continue
         x, value = better
         qualities.append(value)
-    return Climb(chart, x, np.array(qualities), reach <= SMALLEST_REACH * hill.radius)
+    return _ended(hill, Climb(chart, x, np.array(qualities), reach <= SMALLEST_REACH * hill.radius))
+
+
+def _ended(hill: _Hill, end: Climb) -> Climb:
+    """A climb that ended, with whether the index has a maximum there."""
+    if end.quality == np.inf:
+        return replace(end, converged=False, unbounded=True)
+
+    def place_of(x: Array, value: float, reach: float) -> _Surroundings:
+        return _Surroundings(hill, x, value, reach)
+
+    levels = levels_around(place_of, end.x, end.quality, hill.radius)
+    if not end.converged:
+        return replace(end, unbounded=climbs_a_needle(levels))
+    if is_sharp(levels):
+        x, value = followed(place_of, end.x, end.quality, hill.radius)
+        if value > end.quality:
+            end = replace(end, x=x, qualities=np.append(end.qualities, value))
+            levels = levels_around(place_of, x, value, hill.radius)
+        unbounded = never_levels_off(levels)
+        return replace(end, converged=not unbounded, unbounded=unbounded)
+    return end
 
 
 def _start(result: Result, start: int | ArrayLike) -> tuple[int, Array]:
@@ -271,7 +298,7 @@ class _Surroundings:
             options={"maxiter": 8, "ftol": 1e-10},
         )
         w = np.asarray(found.x)
-        return self._better(SHARES[:, None] * w) if np.isfinite(w).all() else None
+        return self.better(SHARES[:, None] * w) if np.isfinite(w).all() else None
 
     def best_of_ring(self) -> tuple[Array, float] | None:
         """The best of some points at distance 1, if it is better."""
@@ -279,9 +306,9 @@ class _Surroundings:
         if W.shape[1] == 2:
             angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
             W = np.column_stack([np.cos(angles), np.sin(angles)])
-        return self._better(W / np.linalg.norm(W, axis=1, keepdims=True))
+        return self.better(W / np.linalg.norm(W, axis=1, keepdims=True))
 
-    def _better(self, W: Array) -> tuple[Array, float] | None:
+    def better(self, W: Array) -> tuple[Array, float] | None:
         """The best of the points above W that meet everything, and its quality, if that is better."""
         gains, slacks = self.look(W)
         for row in np.argsort(-gains, kind="stable"):
@@ -302,13 +329,15 @@ class Peak:
         quality: The largest index with which one ended there.
         climbs: Numbers of the climbs, in the order given [n].
         x: End of the best of them [configuration_size].
-        converged: True when every climb stopped there by itself.
+        converged: True when every climb stopped there by itself, at a maximum.
+        unbounded: True when the best of them ran after an index that grows without bound there.
     """
 
     quality: float
     climbs: IntArray
     x: Array
     converged: bool
+    unbounded: bool = False
 
 
 def peaks_of(result: Result, climbs: Sequence[Climb]) -> list[Peak]:
@@ -333,5 +362,5 @@ def peaks_of(result: Result, climbs: Sequence[Climb]) -> list[Peak]:
     for number in range(n_groups):
         members = np.flatnonzero(group == number)
         top = max((climbs[int(m)] for m in members), key=lambda c: c.quality)
-        peaks.append(Peak(top.quality, members, top.x, all(climbs[int(m)].converged for m in members)))
+        peaks.append(Peak(top.quality, members, top.x, all(climbs[int(m)].converged for m in members), top.unbounded))
     return sorted(peaks, key=lambda peak: -peak.quality)

@@ -19,6 +19,7 @@ from graspatlas.checkpoints import CheckpointFolder, run_digest
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasps
 from graspatlas.growth import Growth, Limits, available_bytes, available_threads
+from graspatlas.local_search import MAX_STEPS
 from graspatlas.problem import Problem
 from graspatlas.quality import Quality, evaluate, find_index, quality_name
 from graspatlas.refinement import refine as climb_peaks
@@ -121,6 +122,7 @@ def optimize(
     quality: Quality | Sequence[Quality] | None = None,
     require: Sequence[Require] | None = None,
     refine: bool | str = False,
+    refine_steps: int = MAX_STEPS,
     max_charts: int | None = None,
     max_seconds: float | None = None,
     max_bytes: float | None = None,
@@ -144,6 +146,7 @@ def optimize(
             problem by default; ``()`` for none.
         refine: Climb from the best charts to the maximum between the charts' centres, ``result.refined_best``: in R
             with True or ``"relevant"``, then on in all dimensions of F with ``"feasible"``; see :func:`refine`.
+        refine_steps: Steps after which such a climb is given up.
         max_charts: See :func:`build_atlas`.
         max_seconds: See :func:`build_atlas`.
         max_bytes: See :func:`build_atlas`.
@@ -165,6 +168,7 @@ def optimize(
     first, *others = _indices(options["quality"])
     if refine not in (False, True, "relevant", "feasible"):
         raise GraspAtlasError(f"refine must be True, False, 'relevant' or 'feasible', got {refine!r}")
+    _whole("refine_steps", refine_steps)
     problem = with_first_grasp(problem, options["dimension"], max_seconds, progress)
     system = problem.system(options["dimension"])
     atlas = build_atlas(
@@ -197,7 +201,7 @@ def optimize(
         others=values,
     )
     if refine and feasible.any():
-        found = climb_peaks(result, all_motions=refine == "feasible", progress=progress)
+        found = climb_peaks(result, all_motions=refine == "feasible", max_steps=refine_steps, progress=progress)
         result = replace(result, refinement=found)
     return result
 

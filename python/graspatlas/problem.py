@@ -22,6 +22,7 @@ from graspatlas.patches import Patch
 from graspatlas.pose_guess import PoseGuess
 from graspatlas.requirements import Requirement, requirement_from_dict
 from graspatlas.tables import checked_instance, checked_table, number, number_array, shown
+from graspatlas.torque_lengths import largest_arm
 
 __all__ = ["Problem"]
 
@@ -64,6 +65,8 @@ class Problem:
         motions: Principal hand motions; without them only the full dimension t can be traced.
         object_joint: How the object moves: ``"free_flyer"``, or ``"planar"`` for problems in the palm's x-y plane.
         length_scale: Length that counts as much as one radian [m].
+        torque_length: Length that divides torques where an index weighs them against forces [m]; by default
+            ``torque_arm`` finds one.
         defaults: ``dimension``, ``radius``, ``epsilon`` and ``quality`` to use when the caller names none.
         requirements: What the best grasp must meet when the caller does not say.
         description, source: For people.
@@ -86,6 +89,7 @@ class Problem:
     description: str = ""
     source: str = ""
     pose_guess: PoseGuess | None = None
+    torque_length: float | None = None
 
     def __post_init__(self) -> None:
         self._check_types()
@@ -96,6 +100,8 @@ class Problem:
         low, high = LENGTH_SCALES
         if not low <= self.length_scale <= high:
             raise GraspAtlasError(f"length_scale must lie between {low:g} and {high:g} m, got {self.length_scale}")
+        if self.torque_length is not None and not 0.0 < self.torque_length < np.inf:
+            raise GraspAtlasError(f"torque_length must be positive, got {self.torque_length}")
         if self.object_joint not in OBJECT_JOINTS:
             raise unknown_name("object joint", self.object_joint, OBJECT_JOINTS)
         if self.pose_guess is not None and self.object_joint == "planar":
@@ -119,6 +125,8 @@ class Problem:
         checked_instance(self.motions, (HandMotions, type(None)), "motions", "HandMotions.from_samples")
         checked_table(self.defaults, "defaults", (), DEFAULTS)
         number(self.length_scale, "length_scale")
+        if self.torque_length is not None:
+            object.__setattr__(self, "torque_length", float(number(self.torque_length, "torque_length")))
 
     def _complete(self) -> None:
         """Add the joints that mimic others to what leaves them out, and put those stated where they must be."""
@@ -214,6 +222,18 @@ class Problem:
             if joint.prismatic:
                 units[joint.v_index] = self.length_scale
         return units
+
+    @cached_property
+    def torque_arm(self) -> float:
+        """The length that divides torques where an index weighs them against forces [m].
+
+        It is ``torque_length`` where that is stated, or else the largest distance from the object's origin at which a
+        contact may touch the object. So it is the same for all grasps, whatever x1 is. It is 0 when all contacts lie at
+        the origin.
+        """
+        if self.torque_length is not None:
+            return self.torque_length
+        return largest_arm(self.contacts, self.object_joint == "planar")
 
     @cached_property
     def full_dimension(self) -> int:
@@ -412,6 +432,8 @@ class Problem:
         }
         if self.requirements:
             table["requirements"] = [requirement.to_dict() for requirement in self.requirements]
+        if self.torque_length is not None:
+            table["torque_length"] = self.torque_length
         if self.reference is not None:
             table["reference"] = dict(self.reference)
         if self.pose_guess is not None:
@@ -438,6 +460,7 @@ class Problem:
             "requirements",
             "x1",
             "reference",
+            "torque_length",
         )
         table = checked_table(data, "the problem", ("name", "hand", "object", "contacts"), optional)
         body = dict(checked_table(table["object"], "the object", ("urdf",), None))
@@ -456,6 +479,7 @@ class Problem:
             pose_guess=PoseGuess.from_dict(guess) if guess is not None else None,
             motions=HandMotions.from_dict(motions) if motions else None,
             length_scale=number(table.get("length_scale", 0.01), "length_scale"),
+            torque_length=table.get("torque_length"),
             defaults=dict(checked_table(table.get("defaults") or {}, "defaults", (), DEFAULTS)),
             requirements=tuple(map(requirement_from_dict, table.get("requirements") or ())),
             description=str(table.get("description", "")),

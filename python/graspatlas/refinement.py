@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,12 +13,12 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.local_search import Climb, Peak, climb, local_maxima, peaks_of
+from graspatlas.local_search import MAX_STEPS, Climb, Peak, climb, local_maxima, peaks_of
 
 if TYPE_CHECKING:
     from graspatlas.result import Result
 
-__all__ = ["Refinement", "refine"]
+__all__ = ["PeakStatus", "Refinement", "refine"]
 
 Array = NDArray[np.float64]
 
@@ -27,15 +28,30 @@ MOST_STARTS = 40
 QUIET_SECONDS = 1.0
 
 
+class PeakStatus(str, Enum):
+    """What a place is at which a climb ended."""
+
+    MAXIMUM = "maximum"
+    UNBOUNDED = "unbounded"
+    GIVEN_UP = "given up"
+
+    def __str__(self) -> str:
+        return self.value
+
+
 @dataclass(frozen=True, eq=False)
 class Refinement:
     """Local maxima of the index on the manifold, the best first.
+
+    Where the index has no maximum, or the climb was given up on its way, the place at which it stopped stands in for one.
 
     Attributes:
         x: The grasps [p, configuration_size].
         qualities: The index there [p].
         starts: Chart from which the climb to each began [p].
-        converged: False for those that were still climbing when given up: the index may have no maximum there [p].
+        converged: True where the climb ended at a maximum by itself; for the others see ``statuses`` [p].
+        unbounded: True where the index has no maximum but grows without bound, as far as numbers can tell [p].
+        steps: Steps of the climb to each [p].
         all_motions: True when no hand motion was frozen but the couplings: the grasps lie in F, not only in R.
         complete: False when interrupted, so that basins may be missing, or climbs in F.
     """
@@ -44,16 +60,43 @@ class Refinement:
     qualities: Array
     starts: NDArray[np.int64]
     converged: NDArray[np.bool_]
+    unbounded: NDArray[np.bool_]
+    steps: NDArray[np.int64]
     all_motions: bool
     complete: bool
 
     @property
     def n_peaks(self) -> int:
-        """Number of local maxima."""
+        """Number of places at which climbs ended."""
         return len(self.x)
 
+    @property
+    def statuses(self) -> tuple[PeakStatus, ...]:
+        """What each of them is."""
+        return tuple(
+            PeakStatus.UNBOUNDED if runs_away else PeakStatus.MAXIMUM if ended else PeakStatus.GIVEN_UP
+            for runs_away, ended in zip(self.unbounded, self.converged, strict=True)
+        )
 
-def refine(result: Result, *, all_motions: bool = False, progress: bool | None = None) -> Refinement:
+    @property
+    def advice(self) -> str:
+        """What the status of the highest place means, and what to do next; empty when it is a maximum."""
+        if self.statuses[0] is PeakStatus.UNBOUNDED:
+            return (
+                "the index has no maximum there, and this is no best grasp: state requirements that rule such grasps "
+                "out, such as force_closure:0.5:0.02 and collision_free, or take another index"
+            )
+        if self.statuses[0] is PeakStatus.GIVEN_UP and self.complete:
+            return (
+                f"the climb was given up after {int(self.steps[0])} steps, still rising, so there are better grasps "
+                f"nearby: climb on with more steps, refine_steps (--refine-steps) {10 * max(int(self.steps[0]), 1)}"
+            )
+        return ""
+
+
+def refine(
+    result: Result, *, all_motions: bool = False, max_steps: int = MAX_STEPS, progress: bool | None = None
+) -> Refinement:
     """Climb from the best chart of each basin, on the manifold and within bounds and requirements.
 
     A basin is what one local maximum of the index over the charts stands for. Its climb is that of
@@ -65,6 +108,7 @@ def refine(result: Result, *, all_motions: bool = False, progress: bool | None =
     Args:
         result: The result.
         all_motions: Go on from there in F, no hand motion frozen but the couplings.
+        max_steps: Steps after which a climb is given up.
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
     Returns:
@@ -92,7 +136,7 @@ def refine(result: Result, *, all_motions: bool = False, progress: bool | None =
     complete = True
     try:
         for chart in charts:
-            ends.append(climb(result, int(chart)))
+            ends.append(climb(result, int(chart), max_steps=max_steps))
             bar.update()
         if all_motions:
             # Climbs in R that met go on as one.
@@ -100,7 +144,7 @@ def refine(result: Result, *, all_motions: bool = False, progress: bool | None =
             bar.total = len(charts) + len(tops)
             starts, ends = starts[tops], [ends[top] for top in tops]
             for i, end in enumerate(ends):
-                ends[i] = climb(result, end.x, all_motions=True)
+                ends[i] = climb(result, end.x, all_motions=True, max_steps=max_steps)
                 bar.update()
     except KeyboardInterrupt:
         complete = False
@@ -110,11 +154,14 @@ def refine(result: Result, *, all_motions: bool = False, progress: bool | None =
     finally:
         bar.close()
     peaks = peaks_of(result, ends)
+    tops = [_top(peak, ends) for peak in peaks]
     return Refinement(
         x=np.array([peak.x for peak in peaks]),
         qualities=np.array([peak.quality for peak in peaks]),
-        starts=np.array([starts[_top(peak, ends)] for peak in peaks], np.int64),
-        converged=np.array([ends[_top(peak, ends)].converged for peak in peaks], bool),
+        starts=np.array([starts[top] for top in tops], np.int64),
+        converged=np.array([ends[top].converged for top in tops], bool),
+        unbounded=np.array([ends[top].unbounded for top in tops], bool),
+        steps=np.array([ends[top].n_steps for top in tops], np.int64),
         all_motions=all_motions,
         complete=complete,
     )
