@@ -27,7 +27,7 @@ LARGEST = {(2, 0.04): 12192.0, (3, 0.1): 15465.0}
 @pytest.mark.parametrize(("name", "k", "radius", "charts"), COUNTS)
 def test_number_of_charts(name, k, radius, charts):
     problem = ga.load_problem(name)
-    result = ga.optimize(problem, dimension=k, radius=radius, epsilon=0.5, quality="manipulability_volume")
+    result = ga.optimize(problem, dimension=k, radius=radius, epsilon=0.5, quality="manipulability_volume", require=[])
     atlas = result.atlas
     assert result.status is ga.Status.COMPLETE
     assert result.is_global
@@ -78,9 +78,9 @@ def test_no_grasp_is_in_two_charts(can_result):
 
 
 def test_more_dimensions_find_better_grasps(bottle_result):
-    wider = ga.optimize(bottle_result.problem, dimension=3, radius=0.2, epsilon=0.5)
+    wider = ga.optimize(bottle_result.problem, dimension=3, radius=0.2, epsilon=0.5, require=[])
     assert wider.best.quality > bottle_result.best.quality
-    line = ga.optimize(bottle_result.problem, dimension=1, radius=0.02, epsilon=0.5)
+    line = ga.optimize(bottle_result.problem, dimension=1, radius=0.02, epsilon=0.5, require=[])
     assert line.atlas.n_charts > 10
     assert line.atlas.status is ga.Status.COMPLETE
     assert line.check().passed
@@ -88,13 +88,13 @@ def test_more_dimensions_find_better_grasps(bottle_result):
 
 
 def test_radius_hardly_changes_the_covered_volume(bottle, bottle_result):
-    coarse = ga.optimize(bottle, dimension=2, radius=0.1, epsilon=0.5)
+    coarse = ga.optimize(bottle, dimension=2, radius=0.1, epsilon=0.5, require=[])
     assert coarse.atlas.volumes.sum() == pytest.approx(bottle_result.atlas.volumes.sum(), rel=0.05)
     assert coarse.best.quality == pytest.approx(bottle_result.best.quality, rel=0.02)
 
 
 def test_results_are_the_same_to_the_bit(can, can_result):
-    again = ga.optimize(can, dimension=2, radius=0.17, epsilon=0.5, quality="manipulability_volume")
+    again = ga.optimize(can, dimension=2, radius=0.17, epsilon=0.5, quality="manipulability_volume", require=[])
     for name, array in can_result.atlas.to_arrays().items():
         assert array.tobytes() == again.atlas.to_arrays()[name].tobytes(), name
     assert again.qualities.tobytes() == can_result.qualities.tobytes()
@@ -105,5 +105,5 @@ def test_results_are_the_same_to_the_bit(can, can_result):
 def test_a_radius_beyond_the_manifold_is_never_called_global(name, radius):
     """One chart as large as the bounds, with corners far from the manifold, covers nothing: refused or reported."""
     problem = ga.load_problem(name)
-    result = unless_refused(lambda: ga.optimize(problem, dimension=2, radius=radius, epsilon=0.5, max_seconds=1.0))
+    result = unless_refused(lambda: ga.optimize(problem, dimension=2, radius=radius, epsilon=0.5, max_seconds=1.0, require=[]))
     assert result is None or not result.is_global
