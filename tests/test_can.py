@@ -105,5 +105,7 @@ def test_results_are_the_same_to_the_bit(can, can_result):
 def test_a_radius_beyond_the_manifold_is_never_called_global(name, radius):
     """One chart as large as the bounds, with corners far from the manifold, covers nothing: refused or reported."""
     problem = ga.load_problem(name)
-    result = unless_refused(lambda: ga.optimize(problem, dimension=2, radius=radius, epsilon=0.5, max_seconds=1.0, require=[]))
+    result = unless_refused(
+        lambda: ga.optimize(problem, dimension=2, radius=radius, epsilon=0.5, max_seconds=1.0, require=[])
+    )
     assert result is None or not result.is_global

@@ -49,7 +49,9 @@ def test_the_papers_problems_are_what_they_were(name):
 @pytest.mark.parametrize(("name", "radius"), [("planar_hand", 0.2), ("schunk_can", 0.34), ("schunk_oil_bottle", 0.2)])
 def test_the_papers_problems_have_the_charts_that_they_had(name, radius):
     stored = json.loads((DATA / "problems" / f"{name}.json").read_text(encoding="utf-8"))
-    old, new = (ga.optimize(p, radius=radius, require=[]) for p in (ga.Problem.from_dict(stored), ga.load_problem(name)))
+    old, new = (
+        ga.optimize(p, radius=radius, require=[]) for p in (ga.Problem.from_dict(stored), ga.load_problem(name))
+    )
     np.testing.assert_array_equal(new.atlas.centers, old.atlas.centers)
     np.testing.assert_array_equal(new.qualities, old.qualities)
 

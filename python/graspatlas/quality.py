@@ -220,9 +220,9 @@ def ferrari_canny_epsilon(
     Args:
         grasps: The grasps.
         friction: Coefficient of friction mu.
-        length_unit: Lambda, the length that divides torques [m]; by default ``problem.torque_arm``, the largest distance
-            from the object's origin at which a contact may touch the object, so that the largest torque of a unit force
-            is about one. It is the same for all grasps of a problem, and does not depend on x1.
+        length_unit: Lambda, the length that divides torques [m]; by default ``problem.torque_arm``, the largest
+            distance from the object's origin at which a contact may touch the object, so that the largest torque of a
+            unit force is about one. It is the same for all grasps of a problem, and does not depend on x1.
         edges: Edges of the friction pyramids. None takes the cones round, to one part in ten thousand from
             below, which for very symmetric grasps takes up to a second each. In the plane both are the same.
 

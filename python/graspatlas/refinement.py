@@ -43,7 +43,7 @@ class PeakStatus(str, Enum):
 class Refinement:
     """Local maxima of the index on the manifold, the best first.
 
-    Where the index has no maximum, or the climb was given up on its way, the place at which it stopped stands in for one.
+    Where the index has no maximum, or the climb was given up on its way, the place where it stopped stands in for one.
 
     Attributes:
         x: The grasps [p, configuration_size].

@@ -1,9 +1,10 @@
 """Climbs on an index without a maximum, told from those that end on a peak.
 
-Some indices grow without bound where a grasp becomes singular: a climb runs after them for ever, or ends where numbers no
-longer tell points apart, and neither place is a best grasp. What tells such an end from a peak is how the index falls
-off around it. On rings ten times as small each time, a peak levels off: a smooth one gains a hundredth from ring to ring,
-a kink a tenth. An index that grows without bound gains as much again, or more, on every ring.
+Some indices grow without bound where a grasp becomes singular: a climb runs after them for ever, or ends where numbers
+no longer tell points apart, and neither place is a best grasp. What tells such an end from a peak is how the index
+falls off around it. On rings ten times as small each time, a peak levels off: from ring to ring a smooth one gains a
+hundredth of what it gained before, a kink a tenth. An index that grows without bound gains as much again, or more, on
+every ring.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ RINGS = 10.0 ** -np.arange(1.0, 6.0)
 #: Points of a ring, and the fewest of them that must be grasps.
 RING_POINTS = 32
 FEWEST = 8
-#: What the index gains from one ring to the next, of what it gained before, is more than this where it never levels off.
+#: Of what the index gained before, it gains more than this share on the next ring where it never levels off.
 LASTING = 0.5
 #: The index is larger than on the largest ring by more than this share of itself where it has run away.
 RUN_AWAY = 0.5
@@ -93,7 +94,7 @@ def _lasts(levels: Array) -> bool:
 
 
 def followed(place_of: PlaceOf, x: Array, value: float, radius: float) -> tuple[Array, float]:
-    """Where ever smaller steps lead from a sharp place, and the index there: the best of a ring, or else a smaller ring.
+    """Where ever smaller steps lead from a sharp place, and the index there: the best of a ring, or a smaller ring.
 
     Args:
         place_of: The surroundings of a grasp.

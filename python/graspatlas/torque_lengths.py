@@ -35,7 +35,7 @@ def largest_arm(contacts: Sequence[Contact], planar: bool = False) -> float:
     """Largest distance from the object's origin that a point of the object may have which a contact may touch [m].
 
     Frozen parameters keep their value, free ones go through their intervals. One without bounds stays at the point of
-    its patch that is nearest to the origin. The distance is found on a grid that is made finer about the farthest point.
+    its patch that is nearest to the origin. The distance is found on a grid that is refined about the farthest point.
 
     Args:
         contacts: The contacts.
