@@ -3,9 +3,9 @@
 The unknowns are tangent coordinates v at x1. Equations, bounds and their derivatives come from `problem.system`, so
 that SLSQP has exact slopes of the constraints and pays compiled prices; the index's slope is by central differences, in
 one batch. Starts are uniform in the box that the atlas has found the feasible grasps to fill, which a user
-would not know. It is a weak opponent: most starts never reach the contacts. Climbs on the manifold, which start from
-grasps, are a strong one; see :mod:`graspatlas.reproduce.climbing`. The equations let a finger touch from inside the
-object too; an inequality rules that out.
+would not know. On some problems it is a weak opponent: most starts on the can never reach the contacts. Climbs on the
+manifold, which start from grasps, are a stronger one there; see :mod:`graspatlas.reproduce.climbing`. The equations let
+a finger touch from inside the object too; an inequality rules that out.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A local optimiser from many starts against the atlas: the paper's claim, tested against a strong opponent.
 
-The climbs stay on the manifold and start from grasps, which is more than the local methods that the paper speaks of do:
-those have to find the contacts first, as :mod:`graspatlas.reproduce.box_starts` does.
+The climbs stay on the manifold and start from grasps, which is more than the local methods have that the paper speaks
+of: those must find the contacts first, as :mod:`graspatlas.reproduce.box_starts` does.
 """
 
 from __future__ import annotations
