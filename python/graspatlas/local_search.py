@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,6 +40,8 @@ IntArray = NDArray[np.int64]
 
 #: Steps after which a climb is given up.
 MAX_STEPS = 200
+#: After so many steps each time a climb looks whether it runs after an index that grows without bound.
+LOOK_AROUND = 50
 #: A climb ends when nothing at this share of the chart radius is better.
 SMALLEST_REACH = 1e-3
 #: What counts as better, relative to the quality.
@@ -132,7 +135,7 @@ def climb(result: Result, start: int | ArrayLike, *, all_motions: bool = False, 
         result: The result; its index may be any callable.
         start: Number of the chart at whose centre to start, or a grasp [configuration_size].
         all_motions: Climb in all t dimensions of F, no hand motion frozen but the couplings, instead of in R.
-        max_steps: Steps after which the climb is given up.
+        max_steps: Steps after which the climb is given up; earlier where the index grows without bound.
 
     Returns:
         The climb.
@@ -168,7 +171,13 @@ def climb(result: Result, start: int | ArrayLike, *, all_motions: bool = False, 
             continue
         x, value = better
         qualities.append(value)
+        if (len(qualities) - 1) % LOOK_AROUND == 0 and climbs_a_needle(_levels(hill, x, value)):
+            break
     return _ended(hill, Climb(chart, x, np.array(qualities), reach <= SMALLEST_REACH * hill.radius))
+
+
+def _levels(hill: _Hill, x: Array, value: float) -> Array:
+    return levels_around(partial(_Surroundings, hill), x, value, hill.radius)
 
 
 def _ended(hill: _Hill, end: Climb) -> Climb:
@@ -176,17 +185,14 @@ def _ended(hill: _Hill, end: Climb) -> Climb:
     if end.quality == np.inf:
         return replace(end, converged=False, unbounded=True)
 
-    def place_of(x: Array, value: float, reach: float) -> _Surroundings:
-        return _Surroundings(hill, x, value, reach)
-
-    levels = levels_around(place_of, end.x, end.quality, hill.radius)
+    levels = _levels(hill, end.x, end.quality)
     if not end.converged:
         return replace(end, unbounded=climbs_a_needle(levels))
     if is_sharp(levels):
-        x, value = followed(place_of, end.x, end.quality, hill.radius)
+        x, value = followed(partial(_Surroundings, hill), end.x, end.quality, hill.radius)
         if value > end.quality:
             end = replace(end, x=x, qualities=np.append(end.qualities, value))
-            levels = levels_around(place_of, x, value, hill.radius)
+            levels = _levels(hill, x, value)
         unbounded = never_levels_off(levels)
         return replace(end, converged=not unbounded, unbounded=unbounded)
     return end
