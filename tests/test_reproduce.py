@@ -172,8 +172,10 @@ def test_whether_more_dimensions_are_better_is_measured() -> None:
     near, far = more_dimensions_claim(100.0, 104.0).found, more_dimensions_claim(12193.0, 15485.0).found
     assert near.startswith("So it is here")
     assert far.startswith("It is not so here: the best volume is 12193 at k = 2 and 15485 at k = 3, 27 % more")
+    assert far.endswith("Neither reproduces the claim.")
+    assert not near.endswith("Neither reproduces the claim.")
     assert "freezes motions of dependent link coordinates" in far
-    assert "9.3 (measured once with that implementation, not by this program)" in far
+    assert "9.3 (reported for that implementation, not measured by this program)" in far
 
 
 def test_components_are_counted_and_compared(planar_result: ga.Result) -> None:

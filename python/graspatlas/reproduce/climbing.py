@@ -73,9 +73,9 @@ class Study:
         """The outcome in words."""
         n = len(self.climbs)
         words = (
-            f"Of {n} climbs on the manifold from random grasps {self.at_best} ({100 * self.rate:.0f} %) ended where "
-            f"the climb from the best chart ended, and {self.at_others} at {self.n_others} other places; {self.below} "
-            f"({100 * self.below / n:.0f} %) ended below the value at the best chart of the atlas."
+            f"Of {n} climbs on the manifold from random grasps of the atlas {self.at_best} ({100 * self.rate:.0f} %) "
+            f"ended where the climb from the best chart ended, and {self.at_others} at {self.n_others} other places; "
+            f"{self.below} ({100 * self.below / n:.0f} %) ended below the value at the best chart of the atlas."
         )
         if self.unbounded:
             words += f" {self.unbounded} ran after the index where it grows without bound, so that there is no maximum."

@@ -11,7 +11,7 @@ MACHINE = "Intel Core 2 Duo at 3 GHz, C and Matlab"
 
 
 #: Best volume of the bottle at k = 3 over that at k = 2 by the implementation that the authors released, on the data
-#: that they released. Source: that implementation, run by the maintainers; this program cannot run it.
+#: that they released. Source: reported for that implementation; this program cannot run it.
 RELEASED_RATIO = 9.3
 
 
