@@ -155,7 +155,7 @@ def schunk_can(progress: bool) -> Section:
     add_box_starts(section, other, "inverse condition number")
     _add_local_search(section, other, "inverse_condition_number", progress)
     section.claims.append(variance_claim(result))
-    add_components(section, setting, result)
+    add_components(section, setting, other)
     add_holding_of_best(section, result)
     _add_holding(section, result, progress)
     return section
