@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 from growth import Row, by_dimension, by_radius, by_threads
-from multistart import multistart
 from numpy_atlas import NumpyAtlas
 
 import graspatlas as ga
+from graspatlas.reproduce.box_starts import multistart
 
 RESULTS = Path(__file__).with_name("RESULTS.md")
 REPEATS = 5

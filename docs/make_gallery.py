@@ -13,9 +13,8 @@ import graspatlas as ga
 
 IMAGES = Path(__file__).parent / "images"
 SIZE = {"width": 640, "height": 480}
-#: Requirements for the paper's problems, whose files name none; none of the bottle's grasps is force-closed.
-HOLDS = (ga.ForceClosure(friction=0.5, margin=0.02), ga.CollisionFree())
-REQUIRE = {"planar_hand": HOLDS, "schunk_can": HOLDS, "schunk_oil_bottle": (ga.CollisionFree(),)}
+#: Requirements for the paper's planar problem, whose file names none.
+REQUIRE = {"planar_hand": (ga.ForceClosure(friction=0.5, margin=0.02), ga.CollisionFree())}
 
 
 def main() -> None:

@@ -29,17 +29,17 @@ def bottle() -> ga.Problem:
 
 @pytest.fixture(scope="session")
 def can_result(can: ga.Problem) -> ga.Result:
-    return ga.optimize(can, dimension=2, radius=0.17, epsilon=0.5, quality="manipulability_volume")
+    return ga.optimize(can, dimension=2, radius=0.17, epsilon=0.5, quality="manipulability_volume", require=[])
 
 
 @pytest.fixture(scope="session")
 def bottle_result(bottle: ga.Problem) -> ga.Result:
-    return ga.optimize(bottle, dimension=2, radius=0.04, epsilon=0.5, quality="manipulability_volume")
+    return ga.optimize(bottle, dimension=2, radius=0.04, epsilon=0.5, quality="manipulability_volume", require=[])
 
 
 @pytest.fixture(scope="session")
 def small_result(bottle: ga.Problem) -> ga.Result:
-    return ga.optimize(bottle, dimension=2, radius=0.2, epsilon=0.5, quality="manipulability_volume")
+    return ga.optimize(bottle, dimension=2, radius=0.2, epsilon=0.5, quality="manipulability_volume", require=[])
 
 
 @pytest.fixture(scope="session")

@@ -71,7 +71,7 @@ def test_bundled_problems_are_all_right():
         assert problem.description
         again = ga.Problem.from_dict(problem.to_dict())
         assert again.to_dict() == problem.to_dict()
-        result = ga.optimize(problem, max_charts=40)
+        result = ga.optimize(problem, max_charts=40, require=[])
         assert result.check().passed
         assert result.best.quality >= result.worst.quality
 

@@ -26,7 +26,7 @@ LARGEST = {(2, 0.04): 12192.0, (3, 0.1): 15465.0}
 @pytest.mark.parametrize(("name", "k", "radius", "charts"), COUNTS)
 def test_number_of_charts(name, k, radius, charts):
     problem = ga.load_problem(name)
-    result = ga.optimize(problem, dimension=k, radius=radius, epsilon=0.5, quality="manipulability_volume")
+    result = ga.optimize(problem, dimension=k, radius=radius, epsilon=0.5, quality="manipulability_volume", require=[])
     atlas = result.atlas
     assert result.status is ga.Status.COMPLETE
     assert result.is_global
@@ -77,9 +77,9 @@ def test_no_grasp_is_in_two_charts(can_result):
 
 
 def test_more_dimensions_find_better_grasps(bottle_result):
-    wider = ga.optimize(bottle_result.problem, dimension=3, radius=0.2, epsilon=0.5)
+    wider = ga.optimize(bottle_result.problem, dimension=3, radius=0.2, epsilon=0.5, require=[])
     assert wider.best.quality > bottle_result.best.quality
-    line = ga.optimize(bottle_result.problem, dimension=1, radius=0.02, epsilon=0.5)
+    line = ga.optimize(bottle_result.problem, dimension=1, radius=0.02, epsilon=0.5, require=[])
     assert line.atlas.n_charts > 10
     assert line.atlas.status is ga.Status.COMPLETE
     assert line.check().passed
@@ -87,13 +87,13 @@ def test_more_dimensions_find_better_grasps(bottle_result):
 
 
 def test_radius_hardly_changes_the_covered_volume(bottle, bottle_result):
-    coarse = ga.optimize(bottle, dimension=2, radius=0.1, epsilon=0.5)
+    coarse = ga.optimize(bottle, dimension=2, radius=0.1, epsilon=0.5, require=[])
     assert coarse.atlas.volumes.sum() == pytest.approx(bottle_result.atlas.volumes.sum(), rel=0.05)
     assert coarse.best.quality == pytest.approx(bottle_result.best.quality, rel=0.02)
 
 
 def test_results_are_the_same_to_the_bit(can, can_result):
-    again = ga.optimize(can, dimension=2, radius=0.17, epsilon=0.5, quality="manipulability_volume")
+    again = ga.optimize(can, dimension=2, radius=0.17, epsilon=0.5, quality="manipulability_volume", require=[])
     for name, array in can_result.atlas.to_arrays().items():
         assert array.tobytes() == again.atlas.to_arrays()[name].tobytes(), name
     assert again.qualities.tobytes() == can_result.qualities.tobytes()
@@ -103,7 +103,7 @@ def test_results_are_the_same_to_the_bit(can, can_result):
 @pytest.mark.parametrize("radius", [1.6, 10.0, 1e6])
 def test_a_radius_beyond_the_manifold_is_refused(name, radius):
     with pytest.raises(ga.GraspAtlasError, match=r"radius must be below 1\.57"):
-        ga.optimize(ga.load_problem(name), dimension=2, radius=radius, epsilon=0.5, max_seconds=1.0)
+        ga.optimize(ga.load_problem(name), dimension=2, radius=radius, epsilon=0.5, max_seconds=1.0, require=[])
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_a_radius_beyond_the_manifold_is_refused(name, radius):
 def test_charts_as_large_as_the_manifold_are_called_global_only_where_they_cover_it(fine, radius, request):
     """Two charts do, of the bottle; a hundred of the can do not, and it is the fine atlas that tells."""
     fine = request.getfixturevalue(fine)
-    result = ga.optimize(fine.problem, dimension=2, radius=radius, epsilon=0.5)
+    result = ga.optimize(fine.problem, dimension=2, radius=radius, epsilon=0.5, require=[])
     found = [result.atlas.locate(x) for x in fine.atlas.centers[::7]]
     covered = all(chart >= 0 and distance <= 0.5 * radius for chart, distance in found)
     assert covered or not result.is_global

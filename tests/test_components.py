@@ -209,11 +209,17 @@ def test_the_bundled_component_is_found_without_x1(name, radius, seed):
     """Its atlas covers that of x1 and is covered by it, and the best grasp is the same up to the size of a chart."""
     start = time.perf_counter()
     found = ga.find_components(
-        without_x1(name), radius=radius, quality="smallest_semi_axis", covered=50, seed=seed, max_seconds=60.0
+        without_x1(name),
+        radius=radius,
+        quality="smallest_semi_axis",
+        require=[],
+        covered=50,
+        seed=seed,
+        max_seconds=60.0,
     )
     assert time.perf_counter() - start < 60.0
     assert len(found) == 2
-    bundled = ga.optimize(ga.load_problem(name), radius=radius, quality="smallest_semi_axis")
+    bundled = ga.optimize(ga.load_problem(name), radius=radius, quality="smallest_semi_axis", require=[])
     homes = [r for r in found.results if r.atlas.locate(bundled.atlas.centers[0])[1] == 0.0]
     assert len(homes) == 1
     (home,) = homes

@@ -40,8 +40,8 @@ def test_indices_follow_from_the_semi_axes(few):
 def test_a_callable_for_each_grasp_or_for_all_at_once(few, bottle):
     np.testing.assert_array_equal(evaluate(height, few), few.x[:, 15])
     np.testing.assert_array_equal(evaluate(heights, few), few.x[:, 15])
-    one = ga.optimize(bottle, radius=0.3, quality=height)
-    two = ga.optimize(bottle, radius=0.3, quality=heights)
+    one = ga.optimize(bottle, radius=0.3, quality=height, require=[])
+    two = ga.optimize(bottle, radius=0.3, quality=heights, require=[])
     np.testing.assert_array_equal(one.qualities, two.qualities)
     assert one.best.object_xyz[2] == one.qualities.max() == one.best.quality
     assert one.summary()["quality"]["name"] == "height"

@@ -401,7 +401,9 @@ def test_isotropy_from_the_eigenvalues_of_GGt(charts: ga.Grasps) -> None:
 def test_isotropy_in_the_plane() -> None:
     problem = symmetric_planar_problem(0.3)
     grasps = ga.Grasps(problem, problem.x1_array)
-    assert quality.grasp_isotropy(grasps)[0] == pytest.approx(1.0, rel=1e-6)
+    assert quality.grasp_isotropy(grasps, np.linalg.norm(grasps.contact_points[0, 0]))[0] == pytest.approx(
+        1.0, rel=1e-6
+    )
     assert quality.grasp_isotropy(grasps, 2.0 * np.linalg.norm(grasps.contact_points[0, 0]))[0] == pytest.approx(0.5)
 
 

@@ -20,8 +20,19 @@ from screens import BROWSER_FLAGS, find_browser
 import graspatlas as ga
 from graspatlas.local_search import climb, local_maxima, peaks_of
 from graspatlas.reproduce import EXPERIMENT_NAMES, reproduce
+from graspatlas.reproduce.climbing import study
 from graspatlas.reproduce.experiments import EXPERIMENTS
+from graspatlas.reproduce.findings import (
+    add_box_starts,
+    add_components,
+    add_holding_of_best,
+    holding,
+    more_dimensions_claim,
+    variance_claim,
+)
 from graspatlas.reproduce.folder import MARKER, report_folder
+from graspatlas.reproduce.report import Section
+from graspatlas.reproduce.runs import Setting, run
 from graspatlas.viewer.figures.indices import with_index
 
 Array = NDArray[np.float64]
@@ -132,6 +143,101 @@ def test_wrong_climbs_are_named(planar_result: ga.Result) -> None:
         climb(planar_result, 0, max_steps=0)
 
 
+# What is found out beside the paper's figures
+
+
+def section() -> Section:
+    return Section("x", "x", "x")
+
+
+def numbers(part: Section) -> dict[str, Any]:
+    return {number.quantity: number.ours for number in part.numbers}
+
+
+def test_experiments_have_no_requirements() -> None:
+    result = run(Setting("schunk_can", 2, 0.4, 0.5, "manipulability_volume"))
+    assert result.problem.requirements
+    assert result.requirements == ()
+    assert result.feasible.all()
+
+
+def test_the_variance_that_is_kept_is_measured(can_result: ga.Result, planar_result: ga.Result) -> None:
+    said = variance_claim(can_result).found
+    assert said.startswith("It does, ")
+    assert "99.71 % is kept, and 99.04 % with 7 motions frozen" in said
+    assert variance_claim(planar_result).found.startswith("It does not")
+
+
+def test_whether_more_dimensions_are_better_is_measured() -> None:
+    near, far = more_dimensions_claim(100.0, 104.0).found, more_dimensions_claim(12193.0, 15485.0).found
+    assert near.startswith("So it is here")
+    assert far.startswith("It is not so here: the best volume is 12193 at k = 2 and 15485 at k = 3, 27 % more")
+    assert far.endswith("Neither reproduces the claim.")
+    assert not near.endswith("Neither reproduces the claim.")
+    assert "freezes motions of dependent link coordinates" in far
+    assert "9.3 (reported for that implementation, not measured by this program)" in far
+
+
+def test_components_are_counted_and_compared(planar_result: ga.Result) -> None:
+    part = section()
+    add_components(part, Setting("planar_hand", 2, 0.125, 0.4, "inverse_condition_number"), planar_result)
+    found = numbers(part)
+    assert found["connected components found"] == 2
+    best, other = (
+        found[f"best chart of {which}"] for which in ("the component of the first grasp", "another component")
+    )
+    assert best == pytest.approx(planar_result.best.quality, rel=0.05)
+    assert other == pytest.approx(0.577 * best, rel=0.05)
+    assert part.claims[0].found.startswith("2 connected components were found")
+
+
+def test_whether_the_bottles_best_grasp_holds_is_measured(bottle_result: ga.Result) -> None:
+    part = section()
+    add_holding_of_best(part, bottle_result)
+    found = numbers(part)
+    assert found["charts that are force-closed at friction 0.5, hard fingertips"] == 0
+    assert found["deepest overlap of two bodies in the best grasp"] == pytest.approx(2.6, abs=0.3)
+    said = part.claims[0].found
+    assert "collides: two bodies overlap by 2.6 mm" in said
+    assert "none of 1510 charts is force-closed" in said.replace("1508", "1510")
+    assert "meet what the bundled problem asks for outside this page (force_closure:0.8:0.02:0.003, " in said
+
+
+def test_climbs_among_grasps_that_hold(can_result: ga.Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("graspatlas.reproduce.climbing.STARTS", 12)
+    held = holding(can_result)
+    outcome = study(held, "can", progress=False)
+    assert len(outcome.climbs) == 12
+    assert all(held.feasible[end.chart] for end in outcome.climbs)
+    assert outcome.unbounded == 0
+    assert outcome.at_best + outcome.at_others == 12
+    assert outcome.below <= 12
+    assert outcome.rate == outcome.at_best / 12
+    assert (
+        f"{outcome.at_best} ({100 * outcome.rate:.0f} %) ended where the climb from the best chart" in outcome.sentence
+    )
+
+
+def test_how_many_starts_are_needed(can_result: ga.Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("graspatlas.reproduce.climbing.STARTS", 4)
+    outcome = replace(study(holding(can_result), "can", progress=False), at_best=1)
+    assert (1.0 - outcome.rate) ** outcome.starts_needed <= 0.05 < (1.0 - outcome.rate) ** (outcome.starts_needed - 1)
+    assert replace(outcome, at_best=4).starts_needed == 1.0
+    assert replace(outcome, at_best=0).starts_needed == np.inf
+    assert "there is no maximum" in replace(outcome, unbounded=2).sentence
+
+
+def test_starts_in_a_box(small_result: ga.Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("graspatlas.reproduce.findings.BOX_SECONDS", 1.0)
+    part = section()
+    add_box_starts(part, small_result, "volume")
+    found = numbers(part)
+    ends = [value for name, value in found.items() if name.startswith("starts that")]
+    assert sum(ends) == found["starts"] > 0
+    share = found["starts that reached the best chart"] / found["starts"]
+    assert part.claims[0].found.startswith("It is so here" if share < 0.5 else "It is not so here")
+
+
 # The folder
 
 
@@ -238,6 +344,8 @@ def test_page_is_offline_and_whole(report: Path) -> None:
     assert "//" not in re.sub(r"<style>.*?</style>", "", text, flags=re.DOTALL)
     assert str(Path.home()) not in text
     assert "$" not in text
+    assert "no grasp is ruled out" in text
+    assert "ours was chosen so that the paper" in text
     found = Links()
     found.feed(text)
     assert found.silent == []

@@ -66,7 +66,7 @@ def test_a_loaded_result_carries_its_problem(small_result, tmp_path):
     assert again.atlas.locate(x)[0] == small_result.atlas.locate(x)[0]
     assert again.problem.hand.urdf == small_result.problem.hand.urdf
     assert again.problem.object.urdf == small_result.problem.object.urdf
-    more = ga.optimize(again.problem, radius=0.2)
+    more = ga.optimize(again.problem, radius=0.2, require=[])
     assert_equal(
         replace(more, quality_seconds=0.0, atlas=replace(more.atlas, seconds=0.0)),
         replace(small_result, quality_seconds=0.0, atlas=replace(small_result.atlas, seconds=0.0)),

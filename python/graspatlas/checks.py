@@ -279,9 +279,12 @@ def _refinement_checks(result: Result, refinement: Refinement) -> Iterator[Check
     grasps = Grasps(problem, refinement.x, system)
     if result.quality in INDICES:
         again = evaluate(result.quality, grasps)
-        error = np.abs(again - refinement.qualities) / np.maximum(np.abs(again), 1e-12)
+        with np.errstate(invalid="ignore"):
+            error = np.abs(again - refinement.qualities) / np.maximum(np.abs(again), 1e-12)
+        error[again == refinement.qualities] = 0.0  # both may be infinite
         yield Check("refined qualities differ from a new evaluation by, relatively", float(error.max()), 1e-6)
-    loss = float(result.best.quality - refinement.qualities.max())
+    best, top = result.best.quality, float(refinement.qualities.max())
+    loss = 0.0 if best == top else best - top
     yield Check("the refined best is worse than the best chart by", loss, 0.0)
     known = [r for r in result.requirements if not isinstance(r, str)]
     met, _ = screen(known, grasps)

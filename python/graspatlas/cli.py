@@ -22,10 +22,12 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.exit_status import FAILED, INTERRUPTED, MISUSE
 from graspatlas.files import replaced, writable_folder
 from graspatlas.interrupts import stoppable, stopped_by
+from graspatlas.local_search import MAX_STEPS
 from graspatlas.optimizer import optimize
 from graspatlas.problem_commands import add_problem_commands
 from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.quality import INDICES, quality_name
+from graspatlas.refinement import Refinement
 from graspatlas.requirements import REQUIREMENTS, parse_requirement
 from graspatlas.result import Result
 from graspatlas.result_commands import add_result_commands
@@ -153,6 +155,13 @@ def _parser() -> argparse.ArgumentParser:
         help="climb to the maximum between the charts' centres: among the relevant grasps, or with 'feasible' on among "
         "all feasible ones, no hand motion frozen but couplings",
     )
+    best.add_argument(
+        "--refine-steps",
+        type=int,
+        default=MAX_STEPS,
+        metavar="N",
+        help="give such a climb up after N steps, 200 by default",
+    )
     best.add_argument("--max-charts", type=int, metavar="N", help="cut the atlas short after N charts")
     best.add_argument("--max-seconds", type=float, metavar="S", help="cut the atlas short after S seconds")
     best.add_argument(
@@ -219,7 +228,17 @@ def _optimize(options: argparse.Namespace) -> int:
     problem = load_problem(options.problem)
     require = [parse_requirement(text) for text in options.require if text != "none"] if options.require else None
     folder = writable_folder(options.output) if options.output else None
-    names = ("dimension", "radius", "epsilon", "quality", "refine", "max_charts", "max_seconds", "threads")
+    names = (
+        "dimension",
+        "radius",
+        "epsilon",
+        "quality",
+        "refine",
+        "refine_steps",
+        "max_charts",
+        "max_seconds",
+        "threads",
+    )
     given = {name: getattr(options, name) for name in names}
     if options.components:
         return _report_components(find_components(problem, **given, require=require, progress=True), options, folder)
@@ -288,6 +307,11 @@ def _report(result: Result, folder: Path | None) -> str:
     ]
     if closed:
         lines.append(f"  vertices that no step could leave: {closed}")
+    if closed.keys() - {"bounds"}:
+        lines.append(
+            "    what lies beyond those closed by curvature or not_converged was not followed; a smaller radius "
+            "follows more"
+        )
     if result.requirements:
         counts = ", ".join(f"{name} refused {count}" for name, count in result.refused.items())
         lines.append(f"  {result.feasible.sum()} grasps meet the requirements; asked in turn, {counts}")
@@ -316,16 +340,33 @@ def _refined_lines(result: Result) -> list[str]:
     refinement, best = result.refinement, result.refined_best
     assert refinement is not None
     where = "all feasible grasps" if refinement.all_motions else "the relevant grasps"
-    peaks = f"{refinement.n_peaks} local maxima" if refinement.n_peaks > 1 else "one local maximum"
-    lines = [
-        f"  refined best {best.quality:.9g} ({100.0 * result.gain:+.3g} %), the highest of {peaks} among {where}:",
-        f"    object at {_row(best.object_xyz)} m, quaternion xyzw {_row(best.object_quat_xyzw)}, joints [rad or m]:",
-        *(f"    {joint:20} {value:9.4f}" for joint, value in best.joint_positions.items()),
-    ]
-    if not refinement.converged[0]:
-        lines.append("    still rising when the climb was given up: the index may have no maximum there")
+    if refinement.unbounded[0]:
+        lines = _runaway_lines(refinement, where)
+    else:
+        peaks = f"{refinement.n_peaks} local maxima" if refinement.n_peaks > 1 else "one local maximum"
+        what = f"the highest of {peaks}" if refinement.converged[0] else "not yet a maximum"
+        lines = [
+            f"  refined best {best.quality:.9g} ({100.0 * result.gain:+.3g} %), {what} among {where}:",
+            f"    object at {_row(best.object_xyz)} m, quaternion xyzw {_row(best.object_quat_xyzw)}, "
+            "joints [rad or m]:",
+            *(f"    {joint:20} {value:9.4f}" for joint, value in best.joint_positions.items()),
+        ]
+    if refinement.advice:
+        lines.append(f"    {refinement.advice}")
     if not refinement.complete:
         lines.append("    interrupted: local maxima may be missing")
+    return lines
+
+
+def _runaway_lines(refinement: Refinement, where: str) -> list[str]:
+    """An index without a maximum, and the highest maximum that it has elsewhere."""
+    n, runs = refinement.n_peaks, int(refinement.unbounded.sum())
+    lines = [
+        f"  no refined best among {where}: the index grows without bound at {runs} of the {n} places where climbs "
+        f"ended, {refinement.qualities[0]:.3g} when they were stopped"
+    ]
+    if refinement.converged.any():
+        lines.append(f"    the highest of the others: {refinement.qualities[refinement.converged][0]:.9g}")
     return lines
 
 

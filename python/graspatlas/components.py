@@ -21,6 +21,7 @@ from graspatlas.atlas import Atlas, Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasp
 from graspatlas.interrupts import stoppable
+from graspatlas.local_search import MAX_STEPS
 from graspatlas.optimizer import optimize, options_of
 from graspatlas.problem import Problem
 from graspatlas.quality import Quality
@@ -53,6 +54,8 @@ class SearchStatus(str, Enum):
 @dataclass(frozen=True, eq=False)
 class Components:
     """The connected components of R that were found, the best first.
+
+    Their qualities can be compared: torques are divided by one length, ``problem.torque_arm``, in all of them.
 
     Parts of one component count as several where atlases that were cut short, or whose charts are too large to follow a
     narrow place, do not meet: see the status and the size of each.
@@ -117,6 +120,7 @@ class Components:
         """The components in plain data, as the command line prints them."""
         return {
             "status": str(self.status),
+            "torque_length": self.best_result.problem.torque_arm,
             "seconds": self.seconds,
             "tries": self.tries,
             "grasps_found": self.found,
@@ -139,6 +143,7 @@ def find_components(
     quality: Quality | Sequence[Quality] | None = None,
     require: Sequence[Require] | None = None,
     refine: bool | str = False,
+    refine_steps: int = MAX_STEPS,
     max_charts: int | None = None,
     max_seconds: float | None = None,
     threads: int | None = None,
@@ -158,6 +163,7 @@ def find_components(
         quality: Name of an index, or a callable; of several the first chooses.
         require: What a grasp must meet to be the best or the worst; the problem's requirements by default.
         refine: Refine the best of each component; see :func:`graspatlas.optimize`.
+        refine_steps: See :func:`graspatlas.optimize`.
         max_charts: Number of charts after which the atlas of a component is cut short; none by default.
         max_seconds: Time after which the search ends; none by default. An atlas that is growing then is cut short.
         threads: See :func:`graspatlas.build_atlas`.
@@ -178,7 +184,8 @@ def find_components(
         raise GraspAtlasError(f"covered must be a whole number of at least 1, got {covered!r}")
     given = {"dimension": dimension, "radius": radius, "epsilon": epsilon, "quality": quality}
     options = options_of(problem, given)
-    options |= {"require": require, "refine": refine, "max_charts": max_charts, "threads": threads}
+    options |= {"require": require, "refine": refine, "refine_steps": refine_steps}
+    options |= {"max_charts": max_charts, "threads": threads}
     traced = _Tracer(options, deadline_after(max_seconds), progress)
     start = time.perf_counter()
     search = GraspSearch(problem, options["dimension"], seed)

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +27,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps import Grasps
 from graspatlas.quality import Quality, evaluate
 from graspatlas.requirements import Require, Requirement, screen
+from graspatlas.runaways import climbs_a_needle, followed, is_sharp, levels_around, never_levels_off
 from graspatlas.search import deadline_after
 from graspatlas.tables import number_array, shown
 
@@ -40,6 +42,8 @@ IntArray = NDArray[np.int64]
 
 #: Steps after which a climb is given up.
 MAX_STEPS = 200
+#: After so many steps each time a climb looks whether it runs after an index that grows without bound.
+LOOK_AROUND = 50
 #: A climb ends when nothing at this share of the chart radius is better.
 SMALLEST_REACH = 1e-3
 #: What counts as better, relative to the quality.
@@ -97,13 +101,17 @@ class Climb:
         chart: Chart at whose centre it started; -1 when it started elsewhere.
         x: Where it ended [configuration_size].
         qualities: The index at the start and after each step; never decreasing.
-        converged: False when it was given up after the largest number of steps, or the longest time.
+        converged: True when it ended at a maximum; False when it was given up after the largest number of steps, or the
+            longest time, or ran after an index that has no maximum there.
+        unbounded: True when the index grows without bound where it went, as far as numbers can tell; see
+            :mod:`graspatlas.runaways`.
     """
 
     chart: int
     x: Array
     qualities: Array
     converged: bool
+    unbounded: bool = False
 
     def __repr__(self) -> str:
         end = "converged" if self.converged else "given up"
@@ -133,13 +141,14 @@ def climb(
     In the tangent space of the current grasp, SLSQP of SciPy maximises the index of the projected point over the
     tangent coordinates, in a box as wide as the chart radius. Its result becomes the next grasp if it is better; if
     not, the best of a ring of points does; if none is better, the box shrinks. The climb ends when the box is a
-    thousandth of the radius.
+    thousandth of the radius. Where it ends the index is looked at on ever smaller rings, which tell a maximum from an
+    index that grows without bound.
 
     Args:
         result: The result; its index may be any callable.
         start: Number of the chart at whose centre to start, or a grasp [configuration_size].
         all_motions: Climb in all t dimensions of F, no hand motion frozen but the couplings, instead of in R.
-        max_steps: Steps after which the climb is given up: an index without bound is climbed for ever.
+        max_steps: Steps after which the climb is given up; earlier where the index grows without bound.
         max_seconds: Time after which the climb is given up, at the end of a step; none by default.
 
     Returns:
@@ -169,7 +178,9 @@ def climb(
     value = float(evaluate(result.quality, hill.grasps(x))[0])
     reach = hill.radius
     qualities = [value]
-    while reach > SMALLEST_REACH * hill.radius and len(qualities) <= max_steps and time.perf_counter() < deadline:
+    while reach > SMALLEST_REACH * hill.radius and len(qualities) <= max_steps and value < np.inf:
+        if time.perf_counter() >= deadline:
+            break
         place = _Surroundings(hill, x, value, reach)
         better = place.optimised() or place.best_of_ring()
         if better is None:
@@ -177,7 +188,31 @@ def climb(
             continue
         x, value = better
         qualities.append(value)
-    return Climb(chart, x, np.array(qualities), reach <= SMALLEST_REACH * hill.radius)
+        if (len(qualities) - 1) % LOOK_AROUND == 0 and climbs_a_needle(_levels(hill, x, value)):
+            break
+    return _ended(hill, Climb(chart, x, np.array(qualities), reach <= SMALLEST_REACH * hill.radius))
+
+
+def _levels(hill: _Hill, x: Array, value: float) -> Array:
+    return levels_around(partial(_Surroundings, hill), x, value, hill.radius)
+
+
+def _ended(hill: _Hill, end: Climb) -> Climb:
+    """A climb that ended, with whether the index has a maximum there."""
+    if end.quality == np.inf:
+        return replace(end, converged=False, unbounded=True)
+
+    levels = _levels(hill, end.x, end.quality)
+    if not end.converged:
+        return replace(end, unbounded=climbs_a_needle(levels))
+    if is_sharp(levels):
+        x, value = followed(partial(_Surroundings, hill), end.x, end.quality, hill.radius)
+        if value > end.quality:
+            end = replace(end, x=x, qualities=np.append(end.qualities, value))
+            levels = _levels(hill, x, value)
+        unbounded = never_levels_off(levels)
+        return replace(end, converged=not unbounded, unbounded=unbounded)
+    return end
 
 
 def _start(result: Result, start: int | ArrayLike) -> tuple[int, Array]:
@@ -286,7 +321,7 @@ class _Surroundings:
             options={"maxiter": 8, "ftol": 1e-10},
         )
         w = np.asarray(found.x)
-        return self._better(SHARES[:, None] * w) if np.isfinite(w).all() else None
+        return self.better(SHARES[:, None] * w) if np.isfinite(w).all() else None
 
     def best_of_ring(self) -> tuple[Array, float] | None:
         """The best of some points at distance 1, if it is better."""
@@ -294,9 +329,9 @@ class _Surroundings:
         if W.shape[1] == 2:
             angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
             W = np.column_stack([np.cos(angles), np.sin(angles)])
-        return self._better(W / np.linalg.norm(W, axis=1, keepdims=True))
+        return self.better(W / np.linalg.norm(W, axis=1, keepdims=True))
 
-    def _better(self, W: Array) -> tuple[Array, float] | None:
+    def better(self, W: Array) -> tuple[Array, float] | None:
         """The best of the points above W that meet everything, and its quality, if that is better."""
         gains, slacks = self.look(W)
         for row in np.argsort(-gains, kind="stable"):
@@ -317,13 +352,15 @@ class Peak:
         quality: The largest index with which one ended there.
         climbs: Numbers of the climbs, in the order given [n].
         x: End of the best of them [configuration_size].
-        converged: True when every climb stopped there by itself.
+        converged: True when every climb stopped there by itself, at a maximum.
+        unbounded: True when the best of them ran after an index that grows without bound there.
     """
 
     quality: float
     climbs: IntArray
     x: Array
     converged: bool
+    unbounded: bool = False
 
     def __repr__(self) -> str:
         return f"<Peak of quality {self.quality:.6g}, where {len(self.climbs)} climbs ended>"
@@ -351,5 +388,5 @@ def peaks_of(result: Result, climbs: Sequence[Climb]) -> list[Peak]:
     for number in range(n_groups):
         members = np.flatnonzero(group == number)
         top = max((climbs[int(m)] for m in members), key=lambda c: c.quality)
-        peaks.append(Peak(top.quality, members, top.x, all(climbs[int(m)].converged for m in members)))
+        peaks.append(Peak(top.quality, members, top.x, all(climbs[int(m)].converged for m in members), top.unbounded))
     return sorted(peaks, key=lambda peak: -peak.quality)

@@ -19,6 +19,7 @@ from graspatlas.checkpoints import CheckpointFolder, run_digest
 from graspatlas.errors import GraspAtlasError
 from graspatlas.growth import Growth, Limits, available_bytes, available_threads
 from graspatlas.interrupts import hear, held, keeping, stoppable, stopping
+from graspatlas.local_search import MAX_STEPS
 from graspatlas.problem import Problem
 from graspatlas.quality import Quality, find_index, quality_name
 from graspatlas.readings import Reading, check_atlas_of
@@ -160,6 +161,7 @@ def optimize(
     quality: Quality | Sequence[Quality] | None = None,
     require: Sequence[Require] | None = None,
     refine: bool | str = False,
+    refine_steps: int = MAX_STEPS,
     max_charts: int | None = None,
     max_seconds: float | None = None,
     max_bytes: float | None = None,
@@ -185,6 +187,7 @@ def optimize(
             problem by default; ``()`` for none.
         refine: Climb from the best charts to the maximum between the charts' centres, ``result.refined_best``: in R
             with True or ``"relevant"``, then on in all dimensions of F with ``"feasible"``; see :func:`refine`.
+        refine_steps: Steps after which such a climb is given up.
         max_charts: See :func:`build_atlas`.
         max_seconds: Time for all of it; none by default. The search for a first grasp ends in an error when it takes
             longer. The atlas is cut short so that about the time is left that reading the index and the requirements
@@ -211,6 +214,7 @@ def optimize(
     options = options_of(problem, chosen)
     if refine not in (False, True, "relevant", "feasible"):
         raise GraspAtlasError(f"refine must be True, False, 'relevant' or 'feasible', got {refine!r}")
+    _whole("refine_steps", refine_steps)
     reading = Reading(_indices(options["quality"]), problem.requirements if require is None else require)
     deadline = start + _seconds(max_seconds)
     problem = with_first_grasp(problem, options["dimension"], max_seconds, progress)
@@ -232,7 +236,8 @@ def optimize(
         if refine and result.feasible.any() and not stopping():
             with keeping(result=result):
                 left = None if max_seconds is None else max(deadline - time.perf_counter(), _SHORTEST)
-                found = climb_peaks(result, all_motions=refine == "feasible", max_seconds=left, progress=progress)
+                climbs = {"all_motions": refine == "feasible", "max_steps": refine_steps, "max_seconds": left}
+                found = climb_peaks(result, **climbs, progress=progress)
             result = replace(result, refinement=found)
     return result
 

@@ -23,6 +23,7 @@ from graspatlas.pickling import Light
 from graspatlas.pose_guess import PoseGuess
 from graspatlas.requirements import Requirement, requirement_from_dict
 from graspatlas.tables import checked_instance, checked_table, number, number_array, read_only, shown
+from graspatlas.torque_lengths import largest_arm
 
 __all__ = ["Problem"]
 
@@ -65,6 +66,8 @@ class Problem(Light):
         motions: Principal hand motions; without them only the full dimension t can be traced.
         object_joint: How the object moves: ``"free_flyer"``, or ``"planar"`` for problems in the palm's x-y plane.
         length_scale: Length that counts as much as one radian [m].
+        torque_length: Length that divides torques where an index weighs them against forces [m]; by default
+            ``torque_arm`` finds one.
         defaults: ``dimension``, ``radius``, ``epsilon`` and ``quality`` to use when the caller names none.
         requirements: What the best grasp must meet when the caller does not say.
         description, source: For people.
@@ -87,6 +90,7 @@ class Problem(Light):
     description: str = ""
     source: str = ""
     pose_guess: PoseGuess | None = None
+    torque_length: float | None = None
 
     def __post_init__(self) -> None:
         self._check_types()
@@ -97,6 +101,8 @@ class Problem(Light):
         low, high = LENGTH_SCALES
         if not low <= self.length_scale <= high:
             raise GraspAtlasError(f"length_scale must lie between {low:g} and {high:g} m, got {self.length_scale}")
+        if self.torque_length is not None and not 0.0 < self.torque_length < np.inf:
+            raise GraspAtlasError(f"torque_length must be positive, got {self.torque_length}")
         if self.object_joint not in OBJECT_JOINTS:
             raise unknown_name("object joint", self.object_joint, OBJECT_JOINTS)
         if self.pose_guess is not None and self.object_joint == "planar":
@@ -124,6 +130,8 @@ class Problem(Light):
         checked_instance(self.motions, (HandMotions, type(None)), "motions", "HandMotions.from_samples")
         checked_table(self.defaults, "defaults", (), DEFAULTS)
         number(self.length_scale, "length_scale")
+        if self.torque_length is not None:
+            object.__setattr__(self, "torque_length", float(number(self.torque_length, "torque_length")))
 
     def _complete(self) -> None:
         """Add the joints that mimic others to what leaves them out, and put those stated where they must be."""
@@ -219,6 +227,18 @@ class Problem(Light):
             if joint.prismatic:
                 units[joint.v_index] = self.length_scale
         return read_only(units)
+
+    @cached_property
+    def torque_arm(self) -> float:
+        """The length that divides torques where an index weighs them against forces [m].
+
+        It is ``torque_length`` where that is stated, or else the largest distance from the object's origin at which a
+        contact may touch the object. So it is the same for all grasps, whatever x1 is. It is 0 when all contacts lie at
+        the origin.
+        """
+        if self.torque_length is not None:
+            return self.torque_length
+        return largest_arm(self.contacts, self.object_joint == "planar")
 
     @cached_property
     def full_dimension(self) -> int:
@@ -418,6 +438,8 @@ class Problem(Light):
         }
         if self.requirements:
             table["requirements"] = [requirement.to_dict() for requirement in self.requirements]
+        if self.torque_length is not None:
+            table["torque_length"] = self.torque_length
         if self.reference is not None:
             table["reference"] = dict(self.reference)
         if self.pose_guess is not None:
@@ -444,6 +466,7 @@ class Problem(Light):
             "requirements",
             "x1",
             "reference",
+            "torque_length",
         )
         table = checked_table(data, "the problem", ("name", "hand", "object", "contacts"), optional)
         body = dict(checked_table(table["object"], "the object", ("urdf",), None))
@@ -462,6 +485,7 @@ class Problem(Light):
             pose_guess=PoseGuess.from_dict(guess) if guess is not None else None,
             motions=HandMotions.from_dict(motions) if motions else None,
             length_scale=number(table.get("length_scale", 0.01), "length_scale"),
+            torque_length=table.get("torque_length"),
             defaults=dict(checked_table(table.get("defaults") or {}, "defaults", (), DEFAULTS)),
             requirements=tuple(map(requirement_from_dict, table.get("requirements") or ())),
             description=str(table.get("description", "")),

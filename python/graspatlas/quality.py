@@ -189,15 +189,14 @@ def _planar(grasps: Grasps) -> bool:
 
 
 def _length(grasps: Grasps, length_unit: float | None) -> float:
-    """The length that divides torques: that given, or the largest arm of a contact force at x1."""
+    """The length that divides torques: that given, or the one of the problem, which is the same for all its grasps."""
     if length_unit is not None:
         return checked_positive(length_unit, "length_unit")
-    points, _ = _contacts(Grasps(grasps.problem, grasps.problem.x1_array, grasps.system))
-    length = float(np.linalg.norm(points[..., : 2 if _planar(grasps) else 3], axis=2).max(initial=0.0))
+    length = grasps.problem.torque_arm
     if not length > 0.0:
         raise GraspAtlasError(
             f"all contacts of problem '{grasps.problem.name}' lie at the object's origin, which leaves no length to "
-            "divide torques by; move that origin or give length_unit [m]"
+            "divide torques by; move that origin, state torque_length in the problem or give length_unit [m]"
         )
     return length
 
@@ -223,8 +222,9 @@ def ferrari_canny_epsilon(
     Args:
         grasps: The grasps.
         friction: Coefficient of friction mu.
-        length_unit: Lambda, the length that divides torques [m]; by default the largest distance of a contact from the
-            object's origin at x1, so that the largest torque of a unit force is about one.
+        length_unit: Lambda, the length that divides torques [m]; by default ``problem.torque_arm``, the largest
+            distance from the object's origin at which a contact may touch the object, so that the largest torque of a
+            unit force is about one. It is the same for all grasps of a problem, and does not depend on x1.
         edges: Edges of the friction pyramids. None takes the cones round, to one part in ten thousand from
             below, which for very symmetric grasps takes up to a second each. In the plane both are the same.
 

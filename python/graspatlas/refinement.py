@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,13 +15,13 @@ from tqdm import tqdm
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.interrupts import held, stoppable, stopping
-from graspatlas.local_search import Climb, Peak, climb, local_maxima, peaks_of
+from graspatlas.local_search import MAX_STEPS, Climb, Peak, climb, local_maxima, peaks_of
 from graspatlas.search import deadline_after
 
 if TYPE_CHECKING:
     from graspatlas.result import Result
 
-__all__ = ["Refinement", "refine"]
+__all__ = ["PeakStatus", "Refinement", "refine"]
 
 Array = NDArray[np.float64]
 
@@ -30,15 +31,30 @@ MOST_STARTS = 40
 QUIET_SECONDS = 1.0
 
 
+class PeakStatus(str, Enum):
+    """What a place is at which a climb ended."""
+
+    MAXIMUM = "maximum"
+    UNBOUNDED = "unbounded"
+    GIVEN_UP = "given up"
+
+    def __str__(self) -> str:
+        return self.value
+
+
 @dataclass(frozen=True, eq=False)
 class Refinement:
     """Local maxima of the index on the manifold, the best first.
+
+    Where the index has no maximum, or the climb was given up on its way, the place where it stopped stands in for one.
 
     Attributes:
         x: The grasps [p, configuration_size].
         qualities: The index there [p].
         starts: Chart from which the climb to each began [p].
-        converged: False for those that were still climbing when given up: the index may have no maximum there [p].
+        converged: True where the climb ended at a maximum by itself; for the others see ``statuses`` [p].
+        unbounded: True where the index has no maximum but grows without bound, as far as numbers can tell [p].
+        steps: Steps of the climb to each [p].
         all_motions: True when no hand motion was frozen but the couplings: the grasps lie in F, not only in R.
         complete: False when interrupted or cut short, so that basins may be missing, or climbs in F.
     """
@@ -47,6 +63,8 @@ class Refinement:
     qualities: Array
     starts: NDArray[np.int64]
     converged: NDArray[np.bool_]
+    unbounded: NDArray[np.bool_]
+    steps: NDArray[np.int64]
     all_motions: bool
     complete: bool
 
@@ -56,13 +74,41 @@ class Refinement:
 
     @property
     def n_peaks(self) -> int:
-        """Number of local maxima."""
+        """Number of places at which climbs ended."""
         return len(self.x)
+
+    @property
+    def statuses(self) -> tuple[PeakStatus, ...]:
+        """What each of them is."""
+        return tuple(
+            PeakStatus.UNBOUNDED if runs_away else PeakStatus.MAXIMUM if ended else PeakStatus.GIVEN_UP
+            for runs_away, ended in zip(self.unbounded, self.converged, strict=True)
+        )
+
+    @property
+    def advice(self) -> str:
+        """What the status of the highest place means, and what to do next; empty when it is a maximum."""
+        if self.statuses[0] is PeakStatus.UNBOUNDED:
+            return (
+                "the index has no maximum there, and this is no best grasp: state requirements that rule such grasps "
+                "out, such as force_closure:0.5:0.02 and collision_free, or take another index"
+            )
+        if self.statuses[0] is PeakStatus.GIVEN_UP and self.complete:
+            return (
+                f"the climb was given up after {int(self.steps[0])} steps, still rising, so there are better grasps "
+                f"nearby: climb on with more steps, refine_steps (--refine-steps) {10 * max(int(self.steps[0]), 1)}"
+            )
+        return ""
 
 
 @stoppable()
 def refine(
-    result: Result, *, all_motions: bool = False, max_seconds: float | None = None, progress: bool | None = None
+    result: Result,
+    *,
+    all_motions: bool = False,
+    max_steps: int = MAX_STEPS,
+    max_seconds: float | None = None,
+    progress: bool | None = None,
 ) -> Refinement:
     """Climb from the best chart of each basin, on the manifold and within bounds and requirements.
 
@@ -75,6 +121,7 @@ def refine(
     Args:
         result: The result.
         all_motions: Go on from there in F, no hand motion frozen but the couplings.
+        max_steps: Steps after which a climb is given up.
         max_seconds: Time after which the climbs are given up, and ``complete`` is False; none by default.
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
@@ -105,7 +152,7 @@ def refine(
     try:
         for chart in charts:
             left = _time_left(deadline)
-            ends.append(climb(result, int(chart), max_seconds=left))
+            ends.append(climb(result, int(chart), max_steps=max_steps, max_seconds=left))
             bar.update()
         if all_motions:
             # Climbs in R that met go on as one.
@@ -114,7 +161,7 @@ def refine(
             starts, ends = starts[tops], [ends[top] for top in tops]
             for i, end in enumerate(ends):
                 left = _time_left(deadline)
-                ends[i] = climb(result, end.x, all_motions=True, max_seconds=left)
+                ends[i] = climb(result, end.x, all_motions=True, max_steps=max_steps, max_seconds=left)
                 bar.update()
     except KeyboardInterrupt:
         complete = False
@@ -125,11 +172,14 @@ def refine(
         with held():
             bar.close()
     peaks = peaks_of(result, ends)
+    tops = [_top(peak, ends) for peak in peaks]
     return Refinement(
         x=np.array([peak.x for peak in peaks]),
         qualities=np.array([peak.quality for peak in peaks]),
-        starts=np.array([starts[_top(peak, ends)] for peak in peaks], np.int64),
-        converged=np.array([ends[_top(peak, ends)].converged for peak in peaks], bool),
+        starts=np.array([starts[top] for top in tops], np.int64),
+        converged=np.array([ends[top].converged for top in tops], bool),
+        unbounded=np.array([ends[top].unbounded for top in tops], bool),
+        steps=np.array([ends[top].n_steps for top in tops], np.int64),
         all_motions=all_motions,
         complete=complete,
     )

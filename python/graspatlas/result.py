@@ -124,6 +124,8 @@ class Result(Light):
     def refined_best(self) -> Grasp:
         """The best grasp, no longer bound to the centre of a chart; its chart is the one the climb to it began from.
 
+        It is the highest place at which a climb ended. Whether that is a maximum says ``refinement.statuses[0]``.
+
         Raises:
             GraspAtlasError: If no refinement was asked for.
         """
@@ -274,6 +276,7 @@ class Result(Light):
             "radius": atlas.radius,
             "epsilon": atlas.epsilon,
             "length_scale": self.problem.length_scale,
+            "torque_length": self.problem.torque_arm,
             "status": str(self.status),
             "n_charts": atlas.n_charts,
             "seconds": {"atlas": atlas.seconds, "quality": self.quality_seconds},
@@ -309,9 +312,13 @@ class Result(Light):
         assert refinement is not None
         return {
             "quality": best.quality,
-            "gain": self.gain,
+            "gain": None if refinement.unbounded[0] else self.gain,
+            "status": str(refinement.statuses[0]),
             "converged": bool(refinement.converged[0]),
+            "steps": int(refinement.steps[0]),
             "n_peaks": refinement.n_peaks,
+            "n_unbounded": int(refinement.unbounded.sum()),
+            "advice": refinement.advice,
             "all_motions": refinement.all_motions,
             "complete": refinement.complete,
             "q": best.q.tolist(),

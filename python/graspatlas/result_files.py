@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
@@ -49,6 +49,7 @@ def save_result(result: Result, path: str | os.PathLike[str]) -> None:
         "format": FORMAT,
         "version": FORMAT_VERSION,
         "problem": result.problem.to_dict(),
+        "torque_length": result.problem.torque_arm,
         "dimension": result.dimension,
         "radius": result.atlas.radius,
         "epsilon": result.atlas.epsilon,
@@ -120,7 +121,7 @@ def _read(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, Any]]:
 def _parts(header: Mapping[str, Any], arrays: dict[str, Any], source: os.PathLike[str]) -> dict[str, Any]:
     """Attributes of a result, once all of them are sound."""
     try:
-        problem = Problem.from_dict(header["problem"])
+        problem = _with_torque_length(Problem.from_dict(header["problem"]), header)
         qualities, feasible = arrays.pop("qualities"), arrays.pop("feasible")
         others = {str(name): arrays.pop(f"other_{i}") for i, name in enumerate(header.get("others", []))}
         refinement = _refinement(header.get("refinement"), arrays, problem)
@@ -198,19 +199,30 @@ def check_configurations(problem: Problem, X: NDArray[np.float64], what: str) ->
             raise GraspAtlasError(f"{name} has length {lengths[off[0]]:g}, not 1, at {what} {off[0]}")
 
 
+def _with_torque_length(problem: Problem, header: Mapping[str, Any]) -> Problem:
+    """The problem with the torque length that the result was computed with, should another one be found today."""
+    length = number(header["torque_length"], "torque_length")
+    return problem if length in (problem.torque_arm, 0.0) else replace(problem, torque_length=length)
+
+
 def _refinement(flags: Mapping[str, Any] | None, arrays: dict[str, Any], problem: Problem) -> Refinement | None:
     """The refinement of a result file, taken out of its arrays."""
     if flags is None:
         return None
     parts = {name: arrays.pop(f"refined_{name}") for name in _REFINEMENT_ARRAYS}
     p = len(parts["x"])
-    shapes = {"x": (p, problem.full_system.configuration_size), "qualities": (p,), "starts": (p,), "converged": (p,)}
-    kinds = {"x": "f", "qualities": "f", "starts": "i", "converged": "b"}
+    kinds = {"x": "f", "qualities": "f", "starts": "i", "converged": "b", "unbounded": "b", "steps": "i"}
+    shapes = {**dict.fromkeys(kinds, (p,)), "x": (p, problem.full_system.configuration_size)}
     for name, array in parts.items():
-        if p == 0 or array.shape != shapes[name] or array.dtype.kind != kinds[name] or not np.isfinite(array).all():
+        if p == 0 or array.shape != shapes[name] or array.dtype.kind != kinds[name] or not _sound(name, array):
             raise GraspAtlasError(f"the refined {name} have shape {array.shape} and type {array.dtype}")
     check_configurations(problem, parts["x"], "refined grasp")
     return Refinement(**parts, all_motions=bool(flags["all_motions"]), complete=bool(flags["complete"]))
+
+
+def _sound(name: str, array: Any) -> bool:
+    """Whether all numbers are finite; qualities that run away may be infinite."""
+    return bool((~np.isnan(array) if name == "qualities" else np.isfinite(array)).all())
 
 
 def _stored_requirement(text: str) -> Require | str:

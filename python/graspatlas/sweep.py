@@ -31,6 +31,7 @@ from graspatlas.optimizer import optimize
 from graspatlas.problem import Problem
 from graspatlas.problems import load_problem
 from graspatlas.quality import find_index
+from graspatlas.refinement import PeakStatus
 from graspatlas.requirements import parse_requirement
 from graspatlas.result import Result
 
@@ -67,6 +68,7 @@ COLUMNS = {
     "seconds_quality": _NUMBER,
     "max_residual": _NUMBER,
     "quality_best": _NUMBER,
+    "refined_status": _TEXT,
     "quality_worst": _NUMBER,
     "quality_at_x1": _NUMBER,
     "best_chart": _WHOLE,
@@ -137,9 +139,14 @@ class Sweep:
         return [row for row in self.rows if row["error"]]
 
     def best(self) -> dict[str, dict[str, Any]]:
-        """For each quality index, the row with the best grasp over all problems and options."""
+        """For each quality index, the row with the best grasp over all problems and options.
+
+        Rows whose refined best is none, since the index grows without bound there, do not count.
+        """
         out: dict[str, dict[str, Any]] = {}
         for row in self.rows:
+            if row["refined_status"] == str(PeakStatus.UNBOUNDED):
+                continue
             value, name = row["quality_best"], row["quality"]
             if value is not None and (name not in out or value > out[name]["quality_best"]):
                 out[name] = row
@@ -371,6 +378,7 @@ def _values(result: Result) -> dict[str, Any]:
     return {
         **values,
         "quality_best": best.quality,
+        "refined_status": str(result.refinement.statuses[0]) if result.refinement else None,
         "quality_worst": result.worst.quality,
         "best_chart": best.chart,
         "best_joints": list(best.joints),

@@ -128,7 +128,7 @@ class _Reading:
                 stated_requirement = requirement.model_dump(exclude_none=True)
                 requirement_from_dict(stated_requirement)
                 plain.setdefault("requirements", []).append(stated_requirement)
-        plain |= {name: stated[name] for name in ("x1", "reference") if stated.get(name) is not None}
+        plain |= {name: stated[name] for name in ("x1", "reference", "torque_length") if stated.get(name) is not None}
         with self._within():
             return Problem.from_dict(plain, self.folder)
 

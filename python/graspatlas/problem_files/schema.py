@@ -238,6 +238,9 @@ class ProblemTable(Table):
     """Posture through which the hand motions that are kept pass; that of x1 by default."""
     length_scale: Positive = 0.01
     """Length that counts as much as one radian [m]."""
+    torque_length: Positive | None = None
+    """Length that divides torques in indices such as ferrari_canny_epsilon [m]; the largest arm of a contact by "
+    "default."""
     defaults: DefaultsTable = Field(default_factory=DefaultsTable)  # type: ignore[arg-type]
     """Options to use when the caller names none."""
     requirements: list[_requirement_table()] = Field(default_factory=list)  # type: ignore[valid-type]

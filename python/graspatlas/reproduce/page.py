@@ -86,8 +86,9 @@ def _method() -> str:
     return (
         "The local optimiser is SciPy's SLSQP in the tangent space of the current grasp, inside a box as wide as a "
         "chart, with joint limits and patch intervals as constraints; it moves on until nothing around it is better, "
-        f"at most {MAX_STEPS} steps. It starts from {STARTS} charts drawn at random (seed {SEED}). Ends that are less "
-        "than half a chart radius apart count as one place."
+        f"at most {MAX_STEPS} steps. It starts from {STARTS} charts drawn at random (seed {SEED}), or from all where "
+        "fewer meet the requirements: grasps that the atlas gives it for nothing, so that it is a strong opponent. "
+        "Ends that are less than half a chart radius apart count as one place."
     )
 
 

@@ -40,6 +40,8 @@ class Setting:
 def run(setting: Setting) -> Result:
     """Trace the atlas and evaluate the index: lengths in millimetres, in length scales where the problem is planar.
 
+    As in the paper, no grasp is ruled out: requirements that the problem's file states are left aside.
+
     Raises:
         KeyboardInterrupt: If it was interrupted: an atlas cut short is none to report.
     """
@@ -49,6 +51,7 @@ def run(setting: Setting) -> Result:
         radius=setting.radius,
         epsilon=setting.epsilon,
         quality=setting.quality,
+        require=[],
         progress=False,
     )
     if result.status is Status.INTERRUPTED:
@@ -76,7 +79,11 @@ def _sizes(result: Result, setting: Setting, paper: Published) -> Iterator[tuple
     yield "variables of F", paper.variables, full.tangent_size, "", WHY["variables"]
     yield "equations of F", paper.equations, full.n_equations, "", WHY["equations"]
     yield "dimension t of feasible grasps", paper.full_dimension, problem.full_dimension
-    yield "frozen hand motions s", paper.frozen_motions, problem.frozen_motions(k)
+    s = problem.frozen_motions(k)
+    yield "frozen hand motions s", paper.frozen_motions, s
+    if problem.motions is not None:
+        kept = 100.0 * problem.motions.variance_kept(s)
+        yield "variance of the hand motions that is kept", paper.kept, kept, "%", WHY["kept"] if paper.kept else ""
     yield "dimension k of relevant grasps", paper.dimension, result.dimension
     same = paper.radius == setting.radius
     yield "radius r of a chart", paper.radius, setting.radius, "", "" if same else WHY["radius"]

@@ -101,7 +101,7 @@ def plot_climbs(
         bars.set_ylabel(f"{name} at the end")
         words = "green: where the best chart leads"
         if any(not peak.converged for peak in peaks):
-            words += "; > : still climbing when given up"
+            words += "; > : no maximum, or given up on the way"
         figure.text(0.98, 0.945, words, ha="right", fontsize=7.5)
     return figure
 

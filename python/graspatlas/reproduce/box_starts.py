@@ -3,7 +3,9 @@
 The unknowns are tangent coordinates v at x1. Equations, bounds and their derivatives come from `problem.system`, so
 that SLSQP has exact slopes of the constraints and pays compiled prices; the index's slope is by central differences, in
 one batch. Starts are uniform in the box that the atlas has found the feasible grasps to fill, which a user
-would not know. The equations let a finger touch from inside the object too; an inequality rules that out.
+would not know. On some problems it is a weak opponent: most starts on the can never reach the contacts. Climbs on the
+manifold, which start from grasps, are a stronger one there; see :mod:`graspatlas.reproduce.climbing`. The equations let
+a finger touch from inside the object too; an inequality rules that out.
 """
 
 from __future__ import annotations
@@ -15,7 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-import graspatlas as ga
+from graspatlas.grasps import Grasps
+from graspatlas.problem import Problem
+from graspatlas.quality import evaluate
+from graspatlas.result import Result
+
+__all__ = ["Multistart", "multistart"]
 
 Array = NDArray[np.float64]
 
@@ -31,7 +38,7 @@ class Multistart:
     """How the starts ended.
 
     Attributes:
-        seconds: Processor time until a start reached the atlas's best, or until the work was given up.
+        seconds: Processor time until a start reached the atlas's best, or until the time was over.
         infeasible, local, reached: How many starts ended off the contacts or inside the object, at a worse grasp, and
             at one as good.
         best: Best index found.
@@ -43,11 +50,16 @@ class Multistart:
     reached: int = 0
     best: float = 0.0
 
+    @property
+    def starts(self) -> int:
+        """How many starts there were."""
+        return self.infeasible + self.local + self.reached
+
 
 class _Unknowns:
     """The problem in tangent coordinates v [n] at x1."""
 
-    def __init__(self, problem: ga.Problem, dimension: int, index: str) -> None:
+    def __init__(self, problem: Problem, dimension: int, index: str) -> None:
         self.problem, self.index = problem, index
         self.system = problem.system(dimension)
         self.x1 = problem.x1_array
@@ -58,8 +70,8 @@ class _Unknowns:
         return np.asarray(self.system.integrate(self.x1, v))
 
     def qualities(self, V: Array) -> Array:
-        grasps = ga.Grasps(self.problem, [self.x(v) for v in V], self.system)
-        return ga.quality.evaluate(self.index, grasps)
+        grasps = Grasps(self.problem, [self.x(v) for v in V], self.system)
+        return evaluate(self.index, grasps)
 
     def objective(self, v: Array) -> float:
         return -float(self.qualities(v[None])[0]) / self.scale
@@ -67,12 +79,13 @@ class _Unknowns:
     def slope(self, v: Array) -> Array:
         h = STEP * np.eye(self.n)
         values = self.qualities(np.concatenate([v + h, v - h]))
-        return -(values[: self.n] - values[self.n :]) / (2.0 * STEP * self.scale)
+        return np.asarray(-(values[: self.n] - values[self.n :]) / (2.0 * STEP * self.scale))
 
     def turned(self, v: Array) -> Array:
         """Derivative of x1 (+) v by v, in the tangent space there [n, n]."""
         x, d = self.x(v), self.system.difference
-        return np.array([np.asarray(d(x, self.x(v + h))) / STEP for h in STEP * np.eye(self.n)]).T
+        columns = [np.asarray(d(x, self.x(v + h))) / STEP for h in STEP * np.eye(self.n)]
+        return np.asarray(np.transpose(columns))
 
     def residual(self, v: Array) -> Array:
         return np.asarray(self.system.evaluate_residual(self.x(v)))
@@ -86,13 +99,13 @@ class _Unknowns:
     def sides(self, V: Array) -> Array:
         """Minus the cosines between the normals of hand and object [n, m]: 1 outside the object, -1 inside it."""
         arrays = self.system.grasp_arrays(np.array([self.x(v) for v in V]))
-        return -np.sum(arrays["hand_normals"] * arrays["object_normals"], axis=2)
+        return np.asarray(-np.sum(arrays["hand_normals"] * arrays["object_normals"], axis=2))
 
     def sides_slope(self, v: Array) -> Array:
         """Derivative of the above by v [m, n]."""
         h = STEP * np.eye(self.n)
         values = self.sides(np.concatenate([v + h, v - h]))
-        return ((values[: self.n] - values[self.n :]) / (2.0 * STEP)).T
+        return np.asarray(((values[: self.n] - values[self.n :]) / (2.0 * STEP)).T)
 
     def feasible(self, v: Array) -> bool:
         """Whether the fingers touch the object everywhere, from outside, and break no bound."""
@@ -105,13 +118,14 @@ class _Unknowns:
         return np.asarray(-self.system.bound_normals @ self.turned(v))
 
 
-def multistart(result: ga.Result, max_seconds: float, seed: int) -> Multistart:
-    """Start SLSQP again and again until it reaches the best grasp of an atlas.
+def multistart(result: Result, max_seconds: float, seed: int, until_reached: bool = True) -> Multistart:
+    """Start SLSQP again and again until it reaches the best grasp of an atlas; requirements are not looked at.
 
     Args:
         result: The atlas's result, with an index that has a name.
-        max_seconds: When to give up.
+        max_seconds: Processor time after which to stop [s].
         seed: Of the random starts.
+        until_reached: Stop as soon as one start was as good as the atlas's best.
     """
     assert isinstance(result.quality, str)
     unknowns = _Unknowns(result.problem, result.dimension, result.quality)
@@ -125,7 +139,7 @@ def multistart(result: ga.Result, max_seconds: float, seed: int) -> Multistart:
     rng = np.random.default_rng(seed)
     ends = Multistart()
     start = time.process_time()
-    while not ends.reached and time.process_time() - start < max_seconds:
+    while not (until_reached and ends.reached) and time.process_time() - start < max_seconds:
         v = minimize(
             unknowns.objective,
             rng.uniform(low, high),
