@@ -237,6 +237,12 @@ class AtlasBuilder:
         """
         The atlas as a dictionary of arrays.
         """
+    def audit(
+        self, points: typing.SupportsInt | typing.SupportsIndex, seconds: typing.SupportsFloat | typing.SupportsIndex
+    ) -> None:
+        """
+        Look for points that a complete atlas does not cover, until that is done or the seconds have passed; where there is one the atlas is open again.
+        """
     def expand(
         self,
         chart_limit: typing.SupportsInt | typing.SupportsIndex,
@@ -250,6 +256,21 @@ class AtlasBuilder:
     ) -> dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]]:
         """
         All that is needed to go on later, as arrays, with the charts from `first` on.
+        """
+    @property
+    def audit_holes(self) -> int:
+        """
+        Charts that audits began where nothing was covered.
+        """
+    @property
+    def audit_points(self) -> int:
+        """
+        Points of random walks that the last audit found covered; 0 when it was given up.
+        """
+    @property
+    def audited(self) -> bool:
+        """
+        True when it is complete, and an audit has ended.
         """
     @property
     def complete(self) -> bool:
@@ -280,6 +301,11 @@ class AtlasBuilder:
     def n_projections(self) -> int:
         """
         Newton projections so far.
+        """
+    @property
+    def n_settled(self) -> int:
+        """
+        Charts, the first ones, whose numbers stay.
         """
     @property
     def n_threads(self) -> int:

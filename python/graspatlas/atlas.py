@@ -48,13 +48,14 @@ class Status(str, Enum):
     TIME_LIMIT = "cut short: limit of time"
     MEMORY_LIMIT = "cut short: limit of memory"
     INTERRUPTED = "cut short: interrupted"
+    BLOCKED = "cut short: steps from some charts failed"
 
     def __str__(self) -> str:
         return self.value
 
 
 class Closed(int, Enum):
-    """Why a vertex of a polytope was not expanded."""
+    """Why a vertex of a polytope was not expanded; covered: an audit went on there by small steps, to other charts."""
 
     OPEN = 0
     BOUNDS = 1
@@ -109,9 +110,13 @@ class Atlas(Light):
         radius, epsilon: r and epsilon of the paper [units of the tangent space].
         status: Whether the atlas is complete.
         seconds: Time that its construction took.
+        audit: How it was looked for points that no chart covers.
         centers: Chart centres x_i [n, configuration_size].
         bases: Orthonormal tangent bases Phi_i, one tangent vector a row [n, k, tangent_size].
         residuals: Largest entry of |R(x_i)| [n].
+        regularities: About the smallest singular value of the Jacobian at each centre, its rows divided by their largest
+            entries [n].
+        nearly_singular: Charts within which the Jacobian loses rank, or falls below a tenth of that [n].
         facet_start, facet_normals, facet_offsets, facet_tags: Facets [n + 1], [f, k], [f], [f]; see ``BOX_TAG``.
         vertex_start, vertices, vertex_closed: Vertices [n + 1], [v, k], and the :class:`Closed` reason of each [v].
         neighbour_pairs: Pairs of charts that cut each other [p, 2].
@@ -204,8 +209,40 @@ class Atlas(Light):
 
     @property
     def complete(self) -> bool:
-        """True when no chart was left to expand."""
-        return self.status is Status.COMPLETE
+        """True when no chart was left to expand, an audit found nothing uncovered, and no vertex is blocked."""
+        return self.status is Status.COMPLETE and self.blocked == 0
+
+    @property
+    def blocked(self) -> int:
+        """How many vertices no step could leave for curvature or want of convergence: what lies there is not known."""
+        reasons = (Closed.CURVATURE.value, Closed.NOT_CONVERGED.value)
+        return int(np.isin(self.vertex_closed, reasons).sum())
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why charts may be missing, each with what to do; empty when nothing speaks against it.
+
+        The Jacobian of a grasp that nearly loses rank may belong to two branches of the manifold that meet there, of
+        which the atlas may follow one.
+        """
+        doubts = []
+        if self.status not in (Status.COMPLETE, Status.BLOCKED):
+            doubts.append(f"the atlas is {self.status}")
+        if self.blocked:
+            doubts.append(
+                f"at {self.blocked} vertices no step succeeds, and what lies there is not known; use a smaller radius"
+            )
+        if self.complete and self.audit.points == 0:
+            doubts.append(
+                "no point could be found beside the charts, to look whether they cover all; use a smaller radius"
+            )
+        count = int(self.nearly_singular.sum())
+        if count:
+            doubts.append(
+                f"at {count} charts the Jacobian nearly loses rank: other branches may begin there; see whether "
+                "find_components finds more"
+            )
+        return tuple(doubts)
 
     @property
     def closed_vertices(self) -> dict[str, int]:

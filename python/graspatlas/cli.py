@@ -247,7 +247,7 @@ def _optimize(options: argparse.Namespace) -> int:
     if folder:
         result.save(folder / "result.npz")
         _write_json(result.summary(), folder / "summary.json")
-        if result.status is Status.COMPLETE:
+        if result.status in (Status.COMPLETE, Status.BLOCKED):
             CheckpointFolder.remove(folder / "checkpoint")
     say(json.dumps(result.summary()) if options.json else _report(result, folder))
     if result.status is Status.INTERRUPTED:
@@ -300,6 +300,7 @@ def _report(result: Result, folder: Path | None) -> str:
     summary = result.summary()
     seconds = summary["seconds"]
     closed = {reason: count for reason, count in result.atlas.closed_vertices.items() if count}
+    audit = result.atlas.audit
     lines = [
         f"{summary['problem']}: {summary['n_charts']} charts of dimension {summary['dimension']} in "
         f"{seconds['atlas']:.3f} s, index in {seconds['quality']:.3f} s; {summary['status']}",
@@ -307,10 +308,10 @@ def _report(result: Result, folder: Path | None) -> str:
     ]
     if closed:
         lines.append(f"  vertices that no step could leave: {closed}")
-    if closed.keys() - {"bounds"}:
+    if result.atlas.complete:
         lines.append(
-            "    what lies beyond those closed by curvature or not_converged was not followed; a smaller radius "
-            "follows more"
+            f"  audited at {audit.points} points of random walks, all covered: at most {audit.share_missing():.2g} of "
+            f"such points are missing, with 95 % confidence"
         )
     if result.requirements:
         counts = ", ".join(f"{name} refused {count}" for name, count in result.refused.items())
@@ -318,9 +319,8 @@ def _report(result: Result, folder: Path | None) -> str:
     lines += _best_lines(result) if result.feasible.any() else ["  no best grasp: relax a requirement"]
     if result.refinement:
         lines += _refined_lines(result)
-    if not result.is_global:
-        lines.append("  the atlas does not cover all grasps: better ones may exist")
-    if folder and result.status is not Status.COMPLETE:
+    lines += [f"  better grasps may exist: {doubt}" for doubt in result.atlas.doubts]
+    if folder and result.status not in (Status.COMPLETE, Status.BLOCKED):
         lines.append("  run the same command again, with a higher limit if there was one, and it goes on from here")
     if folder:
         lines.append(f"  written to {folder}; look at it with: graspatlas view {folder}")

@@ -125,6 +125,8 @@ def _grown(
             audit=audit,
             **builder.arrays(),
         )
+        if status is Status.COMPLETE and atlas.blocked:
+            atlas = replace(atlas, status=Status.BLOCKED)
     with keeping(atlas=atlas):
         hear()
     return atlas
@@ -236,8 +238,13 @@ def optimize(
         if refine and result.feasible.any() and not stopping():
             with keeping(result=result):
                 left = None if max_seconds is None else max(deadline - time.perf_counter(), _SHORTEST)
-                climbs = {"all_motions": refine == "feasible", "max_steps": refine_steps, "max_seconds": left}
-                found = climb_peaks(result, **climbs, progress=progress)
+                found = climb_peaks(
+                    result,
+                    all_motions=refine == "feasible",
+                    max_steps=refine_steps,
+                    max_seconds=left,
+                    progress=progress,
+                )
             result = replace(result, refinement=found)
     return result
 

@@ -84,10 +84,10 @@ class Result(Light):
     def is_global(self) -> bool:
         """True when the best is the best of all grasps connected to x1 that meet the requirements, up to a chart.
 
-        The atlas must be complete, and no vertex closed for want of convergence or for curvature.
+        Then the atlas is complete and was audited, and the Jacobian keeps its rank: see :attr:`Atlas.doubts`, which say
+        why it is not. What an audit can know is said by :meth:`Audit.share_missing`.
         """
-        closed = self.atlas.closed_vertices
-        return self.atlas.complete and closed["curvature"] == 0 and closed["not_converged"] == 0
+        return not self.atlas.doubts
 
     @cached_property
     def best(self) -> Grasp:
@@ -278,6 +278,15 @@ class Result(Light):
             "length_scale": self.problem.length_scale,
             "torque_length": self.problem.torque_arm,
             "status": str(self.status),
+            "is_global": self.is_global,
+            "doubts": list(atlas.doubts),
+            "audit": {
+                "points": atlas.audit.points,
+                "holes": atlas.audit.holes,
+                "share_missing": atlas.audit.share_missing(),
+                "confidence": 0.95,
+                "seconds": atlas.audit.seconds,
+            },
             "n_charts": atlas.n_charts,
             "seconds": {"atlas": atlas.seconds, "quality": self.quality_seconds},
             "max_residual": float(atlas.residuals.max()),

@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graspatlas.archives import DamagedArchive, read_arrays
-from graspatlas.atlas import LARGEST, Atlas, Status
+from graspatlas.atlas import LARGEST, Atlas, Audit, Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.files import is_folder, opened, replaced, stated_path
 from graspatlas.problem import Problem
@@ -55,6 +55,7 @@ def save_result(result: Result, path: str | os.PathLike[str]) -> None:
         "epsilon": result.atlas.epsilon,
         "status": result.status.name,
         "seconds": result.atlas.seconds,
+        "audit": asdict(result.atlas.audit),
         "quality": quality_name(result.quality),
         "quality_seconds": result.quality_seconds,
         "requirements": [requirement_name(r) for r in result.requirements],
@@ -131,6 +132,7 @@ def _parts(header: Mapping[str, Any], arrays: dict[str, Any], source: os.PathLik
             epsilon=number(header["epsilon"], "epsilon"),
             status=Status[header["status"]],
             seconds=number(header["seconds"], "seconds"),
+            audit=_audit(header["audit"]),
             **arrays,
         )
         atlas.check_arrays()
@@ -157,6 +159,15 @@ def _parts(header: Mapping[str, Any], arrays: dict[str, Any], source: os.PathLik
         raise GraspAtlasError(f"result '{source}' is damaged: {error}; compute it again") from None
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError, RecursionError) as error:
         raise GraspAtlasError(f"result '{source}' is damaged ({shown(error)}); compute it again") from None
+
+
+def _audit(table: Mapping[str, Any]) -> Audit:
+    """The audit of an atlas."""
+    points, holes = (int(number(table[name], name)) for name in ("points", "holes"))
+    seconds = number(table["seconds"], "seconds")
+    if min(points, holes) < 0 or not 0.0 <= seconds < np.inf:
+        raise GraspAtlasError("the audit must have counts and a time that are not negative")
+    return Audit(points, holes, seconds)
 
 
 def _check_header(header: Mapping[str, Any], atlas: Atlas) -> None:
