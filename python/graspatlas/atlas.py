@@ -114,8 +114,8 @@ class Atlas(Light):
         centers: Chart centres x_i [n, configuration_size].
         bases: Orthonormal tangent bases Phi_i, one tangent vector a row [n, k, tangent_size].
         residuals: Largest entry of |R(x_i)| [n].
-        regularities: About the smallest singular value of the Jacobian at each centre, its rows divided by their largest
-            entries [n].
+        regularities: About the smallest singular value of the Jacobian at each centre [n], its rows divided by their
+            largest entries.
         nearly_singular: Charts within which the Jacobian loses rank, or falls below a tenth of that [n].
         facet_start, facet_normals, facet_offsets, facet_tags: Facets [n + 1], [f, k], [f], [f]; see ``BOX_TAG``.
         vertex_start, vertices, vertex_closed: Vertices [n + 1], [v, k], and the :class:`Closed` reason of each [v].

@@ -364,7 +364,7 @@ def _charts(problem: Problem, k: int, r: float) -> Finding:
                 return Finding(PROBLEM, "charts", str(error), "choose another radius or epsilon")
             break
         rate = rate or atlas.n_charts / (time.perf_counter() - start)
-        if atlas.status is Status.COMPLETE:
+        if atlas.status in (Status.COMPLETE, Status.BLOCKED):
             return _counted(atlas.n_charts, k, r, tried, rate)
         if atlas.status is not Status.TIME_LIMIT:
             break
