@@ -76,7 +76,7 @@ def test_what_is_a_number_is_one(planar: ga.Result, value: Any) -> None:
     np.testing.assert_array_equal(evaluate(ga.batched(lambda grasps: np.array([value] * 2)), some), [float(value)] * 2)
 
 
-NO_FLAGS = ["yes", "", None, float("nan"), 1, 0, 1.0, [True], [], np.ones(2, bool), np.ma.masked, 1j, object()]
+NO_FLAGS = ["yes", "", None, float("nan"), 1, 0, 1.0, [True], [], np.ones(2, bool), np.ma.masked, 1j, Ellipsis]
 
 
 @pytest.mark.parametrize("value", NO_FLAGS, ids=str)

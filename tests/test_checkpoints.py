@@ -130,7 +130,9 @@ def test_a_damaged_checkpoint_is_refused(tmp_path: Path) -> None:
     for name, value in (
         ("keys", arrays["keys"][::-1]),
         ("closed_charts", np.array([10**6], np.int32)),
-        ("counts", np.array([-1, 0, 0])),
+        ("counts", np.array([-1, 0, 0, 0, 0, 0, 0])),
+        ("counts", np.zeros(3, np.int64)),
+        ("paused", np.array([[1, 10**6, 0]])),
         ("centers", arrays["centers"][:-1]),
     ):
         with path.open("wb") as stream:
@@ -156,6 +158,6 @@ def test_no_vertex_of_a_complete_atlas_is_left() -> None:
     problem = replace(can, contacts=tuple(contacts))
     atlas = ga.build_atlas(problem.system(3), problem.x1_array, radius=0.4, epsilon=0.5)
     assert atlas.complete
-    assert atlas.closed_vertices["curvature"] > 10, "nothing was closed: the test says nothing"
+    assert atlas.closed_vertices["covered"] > 10, "nothing was closed: the test says nothing"
     outside = np.linalg.norm(atlas.vertices, axis=1) > atlas.radius
     assert not (outside & (atlas.vertex_closed == ga.Closed.OPEN.value)).any()

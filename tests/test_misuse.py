@@ -96,7 +96,9 @@ def test_a_first_rotation_must_be_one():
     np.testing.assert_allclose(np.linalg.norm(atlas.centers, axis=1), 1.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("system", [42, None, "sphere", Sphere, lambda x: x], ids=lambda v: getattr(v, "__name__", repr(v)))
+@pytest.mark.parametrize(
+    "system", [42, None, "sphere", Sphere, lambda x: x], ids=lambda v: getattr(v, "__name__", repr(v))
+)
 def test_what_is_no_system(system):
     with pytest.raises(ga.GraspAtlasError, match=r"must be a graspatlas\.System"):
         build(system, [0, 0, 1])

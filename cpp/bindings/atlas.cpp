@@ -71,7 +71,7 @@ ArrayTable atlas_arrays(const Atlas& atlas) {
     std::copy_n(atlas.basis(i), k * v, basis + i * k * v);
     residual[i] = chart.residual;
     regularity[i] = std::abs(chart.regularity);
-    singular[i] = chart.nearly_singular;
+    singular[i] = chart.rank != Rank::full;
     std::int64_t f = facet_start[i];
     for (int a = 0; a < p.facet_slots(); ++a) {
       if (!p.facet_active(a)) continue;
@@ -136,7 +136,7 @@ Checkpoint read_checkpoint(const ArrayTable& table) {
   visit_checkpoint(out, [&table](const char* name, auto& part) { read_array(table, name, part); });
   std::vector<std::int64_t> counts;
   read_array(table, "counts", counts);
-  if (counts.size() != 7) throw Error("the checkpoint's counts must be seven");
+  if (counts.size() != 7) throw Error("the checkpoint is damaged: it needs seven counts");
   out.position = counts[0];
   out.next_first = counts[1];
   out.task_count = counts[2];
@@ -146,7 +146,7 @@ Checkpoint read_checkpoint(const ArrayTable& table) {
   out.audit.points = counts[6];
   std::vector<std::int64_t> paused;
   read_array(table, "paused", paused);
-  if (paused.size() % 3 != 0) throw Error("the checkpoint's paused tasks must be triples");
+  if (paused.size() % 3 != 0) throw Error("the checkpoint is damaged: its paused tasks must be triples");
   for (std::size_t i = 0; i < paused.size(); i += 3)
     out.paused.push_back(
         {paused[i], static_cast<std::int32_t>(paused[i + 1]), static_cast<std::int32_t>(paused[i + 2])});

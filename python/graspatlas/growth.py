@@ -33,7 +33,7 @@ _MEMORY_SHARE = 0.8
 
 
 #: Points of random walks that an audit looks up: at least, and as a share of the charts.
-AUDIT_POINTS, AUDIT_SHARE = 300, 1 / 16
+AUDIT_POINTS, AUDIT_SHARE = 300, 1 / 20
 
 
 @dataclass(frozen=True)

@@ -70,7 +70,7 @@ void Atlas::begin_round(std::int64_t points) {
   for (std::size_t i = 0; i < order_.size(); ++i) {
     const int slot = order_[i];
     const Chart& chart = charts_[slot];
-    if (chart.nearly_singular) looks_.push_back({Look::Kind::rank, slot, 0, 0});
+    if (chart.rank == Rank::doubtful) looks_.push_back({Look::Kind::rank, slot, 0, 0});
     if (chart.closed)
       for (int v = 0; v < chart.polytope.vertex_count(); ++v) {
         const auto reason = static_cast<Closed>(chart.polytope.state(v));
@@ -110,7 +110,7 @@ void Atlas::end_round() {
     points += at.points;
     if (at.kind == Look::Kind::walk || at.kind == Look::Kind::along_bound)
       walks_found = walks_found || !at.holes.empty();
-    if (at.kind == Look::Kind::rank) charts_[at.slot].nearly_singular = at.loses_rank;
+    if (at.kind == Look::Kind::rank) charts_[at.slot].rank = at.loses_rank ? Rank::lost : Rank::full;
     if (at.kind == Look::Kind::closed_vertex)
       charts_[at.slot].polytope.close(at.vertex, static_cast<std::uint8_t>(at.reason));
   }

@@ -19,6 +19,8 @@ constexpr int kHalvings = 3;
 constexpr double kTurn = 0.3;
 // A point of a bound's facet is this far inside the bound, as a share of the radius, where the facet hides something.
 constexpr double kHidden = 0.1;
+// Vertices of a facet towards which it is looked at.
+constexpr int kMostCorners = 3;
 // Steps past a facet or beyond a vertex, as shares of the radius: the first, and the shortest before it is given up.
 constexpr double kMarchStep = 0.25, kShortestMarch = 1.0 / 4096.0;
 constexpr int kMarchSteps = 400;
@@ -183,7 +185,9 @@ Auditor::Auditor(System& system, const AtlasOptions& options, const Charts& char
       Phi_(static_cast<std::size_t>(k_) * n_),
       slack_(static_cast<std::size_t>(system.bound_count())),
       step_(n_),
-      direction_(k_) {}
+      direction_(k_) {
+  walker_->newton.set_scales(&charts.scales());
+}
 
 Auditor::~Auditor() = default;
 
@@ -204,7 +208,7 @@ bool Auditor::covers(int slot, const double* x, const double* Phi) {
   const double off = project_displacement(basis, displacement_.data(), k_, n_, u_.data());
   return off <= options_.epsilon * options_.epsilon &&
          charts_[slot].polytope.contains(u_.data(), kSliver * options_.radius) &&
-         walker_->test.on_one_sheet(center, basis, u_.data(), displacement_.data(), x, Phi);
+         walker_->test.leads_to(center, basis, u_.data(), x, Phi);
 }
 
 // False when no chart covers the point, which then is a hole.
@@ -297,7 +301,7 @@ void Auditor::tangent_vectors_across(const double* normal, const double* basis) 
   }
 }
 
-// Into samples_: the centre of a facet's vertices, and the middles between it and them.
+// Into samples_: the centre of a facet's vertices, and points between it and some of them.
 void Auditor::facet_samples(const Polytope& polytope, int facet) {
   samples_.assign(static_cast<std::size_t>(k_), 0.0);
   const double tolerance = 1e-9 * options_.radius;
@@ -312,7 +316,14 @@ void Auditor::facet_samples(const Polytope& polytope, int facet) {
     for (int c = 0; c < k_; ++c) samples_[c] += u[c];
   }
   for (int c = 0; c < k_; ++c) samples_[c] /= std::max(count, 1);
-  for (std::size_t i = k_; i < samples_.size(); ++i) samples_[i] = 0.5 * (samples_[i] + samples_[i % k_]);
+  corners_.assign(samples_.begin() + k_, samples_.end());
+  samples_.resize(static_cast<std::size_t>(k_));
+  const int kept = std::min(count, kMostCorners);  // of many some, evenly
+  for (int i = 0; i < kept; ++i) {
+    const double* corner = &corners_[static_cast<std::size_t>(i * count / kept) * k_];
+    for (const double share : {1.0 / 3.0, 2.0 / 3.0})
+      for (int c = 0; c < k_; ++c) samples_.push_back(samples_[c] + share * (corner[c] - samples_[c]));
+  }
 }
 
 int Auditor::look_behind_bounds(int slot, std::vector<Hole>& holes) {

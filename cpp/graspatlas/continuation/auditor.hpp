@@ -83,7 +83,7 @@ class Auditor {
   std::map<int, std::unique_ptr<Walker>> bound_walkers_;
   std::vector<std::unique_ptr<System>> bound_systems_;
   bool march_ended_by_bounds_ = false;
-  std::vector<double> displacement_, u_, embedding_, samples_, x_, Phi_, slack_, step_, direction_;
+  std::vector<double> displacement_, u_, embedding_, samples_, corners_, x_, Phi_, slack_, step_, direction_;
   Neighbours::Scratch near_scratch_;
   std::vector<int> near_;
 };

@@ -25,6 +25,9 @@ struct AtlasOptions {
 /// Place of a chart in its atlas in the order of the algorithm, as far as it is known.
 using ChartKey = std::uint64_t;
 
+/// Whether the Jacobian loses rank within a chart: it may by what neighbours say, to first order, or does.
+enum class Rank : std::uint8_t { full, doubtful, lost };
+
 struct Chart {
   Polytope polytope;                ///< facets are tagged by the slots of the charts behind them
   const int* neighbours = nullptr;  ///< slots of the neighbours older than the chart itself
@@ -37,7 +40,7 @@ struct Chart {
   /// Newton::regularity at the centre: its size tells how near the Jacobian is to losing rank, and where its sign is
   /// another than a neighbour's, beside the orientations of their bases, it has lost it between the two.
   double regularity = 1.0;
-  bool nearly_singular = false;  ///< to first order the Jacobian loses rank within the chart
+  Rank rank = Rank::full;
 };
 
 /// The charts of an atlas as several threads make them: each has a slot, a number that means nothing.
@@ -79,6 +82,10 @@ class Charts {
     index_.within(embedding, distance, out, scratch);
   }
 
+  /// Scales of the equations: the largest entries of the Jacobian's rows at the first centre.
+  std::vector<double>& scales() { return scales_; }
+  const std::vector<double>& scales() const { return scales_; }
+
   /// Memory that they hold, without their polytopes' arrays.
   std::int64_t bytes() const { return static_cast<std::int64_t>(charts_.bytes() + rows_.bytes()) + index_.bytes(); }
 
@@ -87,6 +94,7 @@ class Charts {
   Rows<Chart> charts_;
   Rows<double> rows_;  // centre and basis
   Neighbours index_;
+  std::vector<double> scales_;
   std::mutex adding_;
   mutable std::shared_mutex indexing_;
 };

@@ -38,7 +38,9 @@ Expander::Expander(System& system, const AtlasOptions& options, Charts& charts)
       direction_(k_),
       vertex_(k_),
       embedding_(system.embedding_size()),
-      polytope_(k_, half_width(k_, options.radius)) {}
+      polytope_(k_, half_width(k_, options.radius)) {
+  newton_.set_scales(&charts.scales());
+}
 
 void Expander::start(const double* x0) {
   x_new_.assign(x0, x0 + x_size_);
@@ -56,6 +58,7 @@ void Expander::start(const double* x0) {
                   to_text(newton_.residual()));
   }
   newton_.project(x_new_.data(), Phi_new_.data());  // for its factorisation
+  charts_.scales() = newton_.row_sizes();
   residual_new_ = newton_.residual();
   regularity_new_ = newton_.regularity();
   if (!inside_bounds(x_new_.data())) {
@@ -67,6 +70,11 @@ void Expander::start(const double* x0) {
 }
 
 void Expander::put_back(const double* center, const double* basis, double residual, double regularity, ChartKey key) {
+  if (charts_.count() == 0) {
+    x_new_.assign(center, center + x_size_);
+    newton_.project(x_new_.data(), basis);
+    charts_.scales() = newton_.row_sizes();
+  }
   x_new_.assign(center, center + x_size_);
   Phi_new_.assign(basis, basis + static_cast<std::ptrdiff_t>(k_) * n_);
   residual_new_ = residual;
@@ -158,17 +166,17 @@ bool Expander::meets(int i) {
   return test_.passes(charts_.center(i), charts_.basis(i), x_new_.data(), Phi_new_.data(), p_ij_.data(), p_ji_.data());
 }
 
-// Marks charts within which the Jacobian loses rank, to first order: its regularity has another sign beside, or falls
-// to zero within a radius at the rate at which it falls from one centre to the other.
+// Marks charts within which the Jacobian loses rank: between two it does where its determinant beside their bases changes
+// sign; it may where its regularity falls to zero within a radius, at the rate at which it falls between the two.
 void Expander::compare_regularity(int i, int j, double distance) {
   Chart &one = charts_[i], &other = charts_[j];
   const double a = std::abs(one.regularity), b = std::abs(other.regularity);
   const bool turned = determinant_negative(test_.bases_product(), k_);
-  if (((one.regularity < 0.0) != (other.regularity < 0.0)) != turned) {
-    one.nearly_singular = other.nearly_singular = true;
-  } else if (std::min(a, b) * distance < std::abs(a - b) * options_.radius) {
-    (a < b ? one : other).nearly_singular = true;
-  }
+  Chart& less = a < b ? one : other;
+  if (((one.regularity < 0.0) != (other.regularity < 0.0)) != turned)
+    less.rank = Rank::lost;
+  else if (less.rank == Rank::full && std::min(a, b) * distance < std::abs(a - b) * options_.radius)
+    less.rank = Rank::doubtful;
 }
 
 // The chart at x_new_: its own polytope first, which is stored when it has its size, then it is shown to others.

@@ -58,19 +58,9 @@ bool NeighbourTest::leads_to(const double* x_i, const double* Phi_i, const doubl
   if (newton_.project(above_.data(), Phi_i) != Projection::converged) return false;
   system_.difference(above_.data(), x_j, miss_.data());
   const double squared = squared_length(step_.data(), n_);
+  if (!(squared > 0.0)) return true;
   if (squared_length(miss_.data(), n_) > kMiss * kMiss * squared) return false;
   return project_displacement(Phi_j, miss_.data(), k_, n_, in_chart_.data()) <= kOff * kOff * squared;
-}
-
-bool NeighbourTest::on_one_sheet(const double* x_i, const double* Phi_i, const double* p, const double* displacement,
-                                 const double* x_j, const double* Phi_j) {
-  const double squared = squared_length(displacement, n_);
-  if (!(squared > 0.0)) return true;
-  project_displacement(Phi_j, displacement, k_, n_, in_chart_.data());
-  if (tangent_spaces_agree(Phi_i, Phi_j, k_, n_, 1.0 - epsilon_, work_.data()) &&
-      squared_sheet_doubt(p, in_chart_.data(), work_.data(), squared, k_) <= kDoubt * kDoubt)
-    return true;
-  return leads_to(x_i, Phi_i, p, x_j, Phi_j);
 }
 
 }  // namespace graspatlas

@@ -130,11 +130,6 @@ class NeighbourTest {
   /// True when the point of the manifold above p in the tangent space at x_i is x_j, and none of another sheet.
   bool leads_to(const double* x_i, const double* Phi_i, const double* p, const double* x_j, const double* Phi_j);
 
-  /// True when both tangent spaces and the displacement from x_i to x_j leave no doubt that the two are on one sheet,
-  /// or one leads to the other. p = Phi_i (x_j (-) x_i), displacement is x_j (-) x_i.
-  bool on_one_sheet(const double* x_i, const double* Phi_i, const double* p, const double* displacement,
-                    const double* x_j, const double* Phi_j);
-
   /// Of the last call of passes: x_j (-) x_i, and Phi_i Phi_j' [k x k], for the caller to overwrite.
   const double* displacement() const { return displacement_.data(); }
   double* bases_product() { return work_.data(); }

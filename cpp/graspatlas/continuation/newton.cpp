@@ -133,9 +133,16 @@ double Newton::regularity(int iterations) {
   for (int i = 0; i < n; ++i) step_[i] = 1.0 + 0.3 * ((5 * i + 2) % 7) - (i % 2 != 0 ? 2.2 : 0.0);
   double before = 0.0, after = 0.0;
   for (int c = 0; c < n; ++c) after += step_[c] * step_[c];
+  // The rows that were factorised are those of the scaled matrix times these factors.
+  const bool scaled = scales_ && !scales_->empty();
+  const auto rescale = [&] {
+    for (std::size_t e = 0; scaled && e < R_.size(); ++e) step_[e] *= (*scales_)[e] * inverse_sizes_[e];
+  };
   for (int i = 0; i < iterations; ++i) {
+    rescale();
     solver_.solve(step_.data());
     solver_.solve_transposed(step_.data());
+    rescale();
     before = after;
     after = 0.0;
     for (int c = 0; c < n; ++c) after += step_[c] * step_[c];

@@ -45,9 +45,15 @@ class Newton {
 
   double residual() const { return residual_; }  ///< largest entry of |R(x)| at the last point
 
-  /// How near the last factorised [J; Phi'] is to losing rank: about its smallest singular value, rows divided by their
-  /// largest entries, with the sign of its determinant. Beside tangent vectors this is about that of J alone.
-  double regularity(int iterations = 1);
+  /// How near the last factorised [J; Phi'] is to losing rank: about its smallest singular value, from above, with the
+  /// sign of its determinant; J's rows are divided by the scales. Beside tangent vectors this is about that of J alone.
+  double regularity(int iterations = 2);
+
+  /// Scales of the equations [equations], for regularity: a pointer that stays valid. Until it is set, or while it is
+  /// empty, rows are divided by their own largest entries.
+  void set_scales(const std::vector<double>* scales) { scales_ = scales; }
+  /// Largest entries of J's rows at the last point.
+  const std::vector<double>& row_sizes() const { return row_sizes_; }
 
   /// Factorises [J; Phi'] at x, for `approach` and `regularity`. False when it is singular.
   bool hold(const double* x, const double* Phi);
@@ -64,6 +70,7 @@ class Newton {
   System& system_;
   NewtonOptions options_;
   LinearSolver solver_;
+  const std::vector<double>* scales_ = nullptr;
   std::vector<double> R_, J_, row_sizes_, inverse_sizes_, step_, tangents_, corrections_;
   double residual_ = 0.0;
 };
