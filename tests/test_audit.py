@@ -11,6 +11,7 @@ from manifolds import Cone, Crossing, Ellipsoid, Neck, Rooms, Shells, share_miss
 
 import graspatlas as ga
 from graspatlas import _core
+from graspatlas.coverage import measure_coverage
 from graspatlas.systems import Sphere
 
 # What the manifold is, and the radius of the charts.
@@ -181,3 +182,31 @@ def test_limits_of_time_are_kept_in_seven_dimensions(threads):
     assert time.perf_counter() - start < 2.5
     assert atlas.status is ga.Status.TIME_LIMIT
     assert atlas.n_charts > 1
+
+
+def test_a_component_whose_jacobian_nearly_loses_rank_is_covered_and_not_called_global():
+    """The large component of the cup: walks in NumPy found points a chart's radius off, and it was called global."""
+    found = ga.find_components(ga.load_problem("three_finger_cup"), covered=4, progress=False)
+    atlas = max((result.atlas for result in found.results), key=lambda atlas: atlas.n_charts)
+    assert atlas.n_charts > 50_000
+    coverage = measure_coverage(atlas, atlas.system, points=1000, seed=11)
+    assert coverage.farthest <= 0.15
+    assert atlas.audit.holes > 0
+    assert atlas.nearly_singular.sum() > 100
+    assert not next(result for result in found.results if result.atlas is atlas).is_global
+
+
+@pytest.mark.parametrize("room", [1e-4, 1e-9])
+def test_a_strip_as_narrow_as_its_limits_is_followed(can, room):
+    """No step can be taken inside it but along its bounds; what it covers is as long as the wider strip."""
+    angle = can.x1.joints["thumb_pip"]
+    strips = []
+    for half in (1e-2, room):
+        hand = replace(can.hand, limits={"thumb_pip": (angle - half, angle + half)})
+        strips.append(ga.optimize(replace(can, hand=hand), dimension=2, radius=0.2, require=()).atlas)
+    narrow = strips[1]
+    assert narrow.audit.holes > 0
+    assert narrow.n_charts > 15
+    # From end to end, by the farthest two charts.
+    lengths = [np.linalg.norm(a.centers[:, None] - a.centers[None], axis=2).max() for a in strips]
+    assert lengths[1] == pytest.approx(lengths[0], rel=0.15)
