@@ -17,8 +17,9 @@ demo: $(VENV)/.installed
 	$(BIN)/graspatlas view out/schunk_can --picture out/schunk_can/grasps.png --html out/schunk_can/grasps.html
 	@echo "Open out/schunk_can/grasps.html in a browser, or run: $(BIN)/graspatlas view out/schunk_can"
 
+# On two processes; the tests of a file share theirs, and what they compute.
 test: $(VENV)/.tools
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 # The C++ core under the compiler's sanitizers; SANITIZE=thread looks for data races instead.
 SANITIZE ?= address,undefined

@@ -126,13 +126,13 @@ def test_charts_are_told_after_a_requirement_has_refused_some(planar: ga.Result)
 # ------------------------------------------------------------------------------------------- read-only
 
 
-def arrays_in(thing: Any, path: str, seen: set[int], depth: int = 5) -> list[tuple[str, np.ndarray[Any, Any]]]:
+def arrays_in(thing: Any, path: str, seen: dict[int, Any], depth: int = 5) -> list[tuple[str, np.ndarray[Any, Any]]]:
     """All arrays that can be reached from an object by attributes that may be read."""
     if isinstance(thing, np.ndarray):
         return [(path, thing)]
     if id(thing) in seen or depth == 0:
         return []
-    seen.add(id(thing))
+    seen[id(thing)] = thing  # kept alive, so that no other gets its id
     if isinstance(thing, tuple | list):
         return [found for i, part in enumerate(thing) for found in arrays_in(part, f"{path}[{i}]", seen, depth - 1)]
     if not type(thing).__module__.startswith("graspatlas.") or isinstance(thing, type):
@@ -163,17 +163,17 @@ def test_a_function_that_writes_into_a_grasp_changes_nothing(name: str, dimensio
         return {
             path: array.tobytes()
             for key, thing in things.items()
-            for path, array in arrays_in(thing, key, set())
+            for path, array in arrays_in(thing, key, {})
             if not path.endswith(".charts")
         }
 
     @ga.batched
     def spoils_a_batch(grasps: Grasps) -> Any:
-        spoil(arrays_in(grasps, "", set()))
+        spoil(arrays_in(grasps, "", {}))
         return np.zeros(len(grasps))
 
     def spoils(grasp: ga.Grasp) -> bool:
-        spoil(arrays_in(grasp, "", set()))
+        spoil(arrays_in(grasp, "", {}))
         return True
 
     written = []
@@ -303,7 +303,7 @@ def test_max_seconds_leaves_time_to_read(small_result: ga.Result) -> None:
     seconds = time.perf_counter() - start
     assert result.status is ga.Status.TIME_LIMIT
     assert result.quality_seconds > 0.5
-    assert 1.0 < seconds < 3.0
+    assert 1.0 < seconds < 4.0
 
 
 @pytest.mark.parametrize("where", ["relevant", "feasible"])

@@ -51,6 +51,9 @@ FIELDS = {
     "length_scale": float,
     "torque_length": float,
     "status": str,
+    "is_global": bool,
+    "doubts": list,
+    "audit": dict,
     "n_charts": int,
     "seconds": {"atlas": float, "quality": float},
     "max_residual": float,
@@ -95,7 +98,7 @@ def test_report_for_people(cli):
         "thumb_opposition",
     ):
         assert words in out
-    assert "better ones may exist" not in out
+    assert "better grasps may exist" not in out
 
 
 def test_output_folder(cli, tmp_path):
@@ -117,7 +120,7 @@ def test_cut_short(cli):
     status, out, _ = cli("optimize", "schunk_can", "--radius", "0.01", "--max-seconds", "0.2", "--require", "none")
     assert status == 0
     assert "cut short: limit of time" in out
-    assert "better ones may exist" in out
+    assert "better grasps may exist" in out
 
 
 def test_list(cli):

@@ -327,7 +327,7 @@ def test_table_of_any_atlas(sphere: ga.Atlas) -> None:
     table = sphere.to_pandas(volumes=True)
     assert list(table) == [
         *("x0", "x1", "x2", "residual", "n_neighbours", "n_facets", "n_vertices"),
-        *("closed_bounds", "closed_curvature", "closed_not_converged", "volume"),
+        *("closed_bounds", "closed_curvature", "closed_not_converged", "closed_covered", "volume"),
     ]
     assert_allclose(np.linalg.norm(table[["x0", "x1", "x2"]], axis=1), 1.0, atol=1e-9)
     assert table["volume"].sum() == pytest.approx(4 * np.pi, rel=1e-2)

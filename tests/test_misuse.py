@@ -171,7 +171,8 @@ def test_nan_on_the_way_closes_charts_and_says_so():
     """Where the residual is NaN the manifold ends: the atlas stops there with the reason."""
     system = Written(3, 1, lambda x: [x @ x - 1.0 if x[2] > 0 else np.nan], lambda x: [2.0 * x])
     atlas = build(system, [0, 0, 1])
-    assert atlas.complete
+    assert not atlas.complete
+    assert atlas.status is ga.Status.BLOCKED
     assert atlas.closed_vertices["not_converged"] > 10
     assert atlas.centers[:, 2].min() > 0.0
     assert np.isfinite(atlas.centers).all()

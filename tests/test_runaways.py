@@ -132,22 +132,6 @@ def test_an_index_with_a_pole_is_unbounded(name: str) -> None:
     assert bounded.refined_best.quality == pytest.approx(50.0, rel=1e-3)
 
 
-def test_an_infinite_index_is_unbounded() -> None:
-    problem = ga.load_problem("planar_hand")
-    first = ga.optimize(problem, radius=RADIUS)
-    x0 = first.atlas.centers[40]
-
-    @ga.batched
-    def index(grasps: ga.Grasps) -> Array:
-        there = np.array([np.array_equal(x, x0) for x in grasps.x])
-        return np.where(there, np.inf, 1.0)
-
-    result = ga.optimize(problem, radius=RADIUS, quality=index, refine=True)
-    assert result.refinement is not None
-    assert str(result.refinement.statuses[0]) == "unbounded"
-    assert result.check().passed
-
-
 @pytest.mark.parametrize("name", ["planar_hand", "schunk_oil_bottle", "allegro_sphere_3", "allegro_cylinder_4"])
 @pytest.mark.parametrize("quality", ["manipulability_volume", "smallest_semi_axis", "inverse_condition_number"])
 def test_honest_maxima_are_never_called_unbounded(name: str, quality: str) -> None:

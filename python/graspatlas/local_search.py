@@ -178,7 +178,7 @@ def climb(
     value = float(evaluate(result.quality, hill.grasps(x))[0])
     reach = hill.radius
     qualities = [value]
-    while reach > SMALLEST_REACH * hill.radius and len(qualities) <= max_steps and value < np.inf:
+    while reach > SMALLEST_REACH * hill.radius and len(qualities) <= max_steps:
         if time.perf_counter() >= deadline:
             break
         place = _Surroundings(hill, x, value, reach)
@@ -199,9 +199,6 @@ def _levels(hill: _Hill, x: Array, value: float) -> Array:
 
 def _ended(hill: _Hill, end: Climb) -> Climb:
     """A climb that ended, with whether the index has a maximum there."""
-    if end.quality == np.inf:
-        return replace(end, converged=False, unbounded=True)
-
     levels = _levels(hill, end.x, end.quality)
     if not end.converged:
         return replace(end, unbounded=climbs_a_needle(levels))

@@ -89,5 +89,6 @@ def _stl_corners(path: Path) -> NDArray[np.float64] | None:
             return np.fromfile(stream, _STL_TRIANGLE, count)["corners"].reshape(-1, 3).astype(float)
     if not head.lstrip().startswith(b"solid"):
         return None
-    rows = [line.split()[1:4] for line in read_text(path, "latin-1").splitlines() if line.lstrip().startswith("vertex")]
+    words = read_text(path, "latin-1").split()  # of the file, whose lines may be broken anywhere
+    rows = [words[i + 1 : i + 4] for i, word in enumerate(words) if word == "vertex"]
     return np.array(rows, float).reshape(-1, 3)

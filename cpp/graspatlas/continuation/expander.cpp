@@ -166,8 +166,9 @@ bool Expander::meets(int i) {
   return test_.passes(charts_.center(i), charts_.basis(i), x_new_.data(), Phi_new_.data(), p_ij_.data(), p_ji_.data());
 }
 
-// Marks charts within which the Jacobian loses rank: between two it does where its determinant beside their bases changes
-// sign; it may where its regularity falls to zero within a radius, at the rate at which it falls between the two.
+// Marks charts within which the Jacobian loses rank: between two it does where its determinant beside their bases
+// changes sign; it may where its regularity falls to zero within a radius, at the rate at which it falls between the
+// two.
 void Expander::compare_regularity(int i, int j, double distance) {
   Chart &one = charts_[i], &other = charts_[j];
   const double a = std::abs(one.regularity), b = std::abs(other.regularity);

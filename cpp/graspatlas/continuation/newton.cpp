@@ -10,7 +10,7 @@ namespace {
 
 // As near the manifold as this the factorisation serves for the remaining steps, which converge at once, and for the
 // tangent basis [units of the tangent space].
-constexpr double kNearlyZero = 1e-6;
+constexpr double kNearlyZero = 1e-7;
 // Rounding of an equation beside the numbers in x, which no step can make smaller.
 constexpr double kRounding = 1e-14;
 // A Jacobian whose smallest singular value is this far below its largest has lost rank.

@@ -13,7 +13,7 @@ enum class Projection { converged, not_converged, singular };
 struct NewtonOptions {
   /// How far from an equation's zero set a point may be, to first order [units of the tangent space]: the largest
   /// |R_e(x)| beside the largest entry of row e of J(x), so that no equation's scale matters.
-  double tolerance = 1e-11;
+  double tolerance = 1e-12;
   int max_iterations = 10;
 };
 
