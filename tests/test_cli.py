@@ -55,7 +55,7 @@ FIELDS = {
     "doubts": list,
     "audit": dict,
     "n_charts": int,
-    "seconds": {"atlas": float, "quality": float},
+    "seconds": {"atlas": float, "audit": float, "quality": float},
     "max_residual": float,
     "quality": {"name": str, "best": float, "worst": float, "at_x1": float},
     "best": {"q": list, "object_xyz": list, "object_quat_xyzw": list, "chart": int},

@@ -285,10 +285,9 @@ class Result(Light):
                 "holes": atlas.audit.holes,
                 "share_missing": atlas.audit.share_missing(),
                 "confidence": 0.95,
-                "seconds": atlas.audit.seconds,
             },
             "n_charts": atlas.n_charts,
-            "seconds": {"atlas": atlas.seconds, "quality": self.quality_seconds},
+            "seconds": {"atlas": atlas.seconds, "audit": atlas.audit.seconds, "quality": self.quality_seconds},
             "max_residual": float(atlas.residuals.max()),
             "quality": {
                 "name": quality_name(self.quality),
