@@ -38,7 +38,11 @@ def atlas_row(name: str, system: ga.systems.AnySystem, x0: Any, radius: float, e
         lambda: ga.build_atlas(system, x0, radius=radius, epsilon=epsilon, threads=1, progress=False)
     )
     rate = atlas.n_charts / seconds
-    print(f"{name:32} {atlas.n_charts:7d} charts {1e3 * seconds:9.1f} ms {rate:9.0f} charts/s   {atlas.status}")
+    audit = 100 * atlas.audit.seconds / atlas.seconds
+    print(
+        f"{name:32} {atlas.n_charts:7d} charts {1e3 * seconds:9.1f} ms {rate:9.0f} charts/s, "
+        f"{audit:.0f} % of it the audit   {atlas.status}"
+    )
 
 
 def grasp_rows(name: str, dimension: int, radius: float) -> None:
