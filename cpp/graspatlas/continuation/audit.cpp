@@ -10,8 +10,8 @@ namespace {
 // Steps that a random walk takes, about, and walks along bounds beside one that is free.
 constexpr std::int64_t kPointsOfWalk = 6;
 constexpr double kAlongBounds = 0.5;
-// Places that are looked at before the clock is.
-constexpr std::size_t kPiece = 256;
+// Time after which the clock is looked at again, about [s].
+constexpr double kPieceSeconds = 0.01;
 // An atlas in which every round of so many finds holes is not audited further.
 constexpr std::int64_t kMostRounds = 100;
 
@@ -30,14 +30,18 @@ void Atlas::audit(std::int64_t points, double seconds) {
   for (auto& worker : workers_)
     if (!worker->auditor)
       worker->auditor = std::make_unique<Auditor>(worker->system ? *worker->system : system_, options_, charts_);
-  while (next_look_ < looks_.size()) {
-    const std::size_t count = std::min(kPiece * workers_.size(), looks_.size() - next_look_);
+  std::size_t piece = 8 * workers_.size();
+  for (double before = 0.0; next_look_ < looks_.size();) {
+    const std::size_t count = std::min(piece, looks_.size() - next_look_);
     parallel_for(threads(), static_cast<std::int64_t>(count), [&](int worker, std::int64_t first, std::int64_t last) {
       Auditor& auditor = *workers_[static_cast<std::size_t>(worker)]->auditor;
       for (std::int64_t i = first; i < last; ++i) look(auditor, looks_[next_look_ + static_cast<std::size_t>(i)]);
     });
     next_look_ += count;
-    if (std::chrono::duration<double>(Clock::now() - start).count() > seconds && next_look_ < looks_.size()) return;
+    const double now = std::chrono::duration<double>(Clock::now() - start).count();
+    if (now > seconds && next_look_ < looks_.size()) return;
+    piece = now - before < kPieceSeconds ? 2 * piece : std::max<std::size_t>(piece / 2, 1);
+    before = now;
   }
   end_round();
 }
