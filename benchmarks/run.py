@@ -16,7 +16,7 @@ import numpy as np
 
 import graspatlas as ga
 from graspatlas import _core
-from graspatlas.collision import CollisionChecker
+from graspatlas.requirements.collision import CollisionChecker
 
 REPEATS = 7
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import graspatlas as ga
-from graspatlas.urdf import cylinder_urdf
+from graspatlas.hand.urdf import cylinder_urdf
 
 URDF = Path(__file__).parent / "own_hand" / "three_fingers.urdf"
 FINGERS = ("thumb", "left", "right")

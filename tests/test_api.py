@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 MODULES = [
     ga, ga.motions, ga.patches, ga.quality, ga.systems,
-    *(__import__(f"graspatlas.{name}", fromlist=["x"]) for name in ("atlas", "checks", "hand", "problem", "result")),
+    *(__import__(f"graspatlas.{name}", fromlist=["x"]) for name in ("atlas", "grasps", "hand", "optimizer", "paths", "problem", "requirements", "result", "search", "sweep")),
 ]  # fmt: skip
 
 

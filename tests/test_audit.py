@@ -11,7 +11,7 @@ from manifolds import Cone, Crossing, Ellipsoid, Neck, Rooms, Shells, share_miss
 
 import graspatlas as ga
 from graspatlas import _core
-from graspatlas.coverage import measure_coverage
+from graspatlas.atlas.coverage import measure_coverage
 from graspatlas.systems import Sphere
 
 # What the manifold is, and the radius of the charts.

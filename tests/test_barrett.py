@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import graspatlas as ga
-from graspatlas.diagnosis import NOTE, PROBLEM, diagnose
+from graspatlas.commands.diagnosis import NOTE, PROBLEM, diagnose
 from graspatlas.requirements import screen
 from graspatlas.search import GraspSearch
 

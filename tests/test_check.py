@@ -13,13 +13,13 @@ import pytest
 from helpers import BENT, chain, robot, tripod_problem
 
 import graspatlas as ga
-from graspatlas import diagnosis
 from graspatlas.cli import main
-from graspatlas.collision import CollisionChecker
-from graspatlas.diagnosis import NOTE, OK, PROBLEM, Finding, diagnose, redundant_joints, report
+from graspatlas.commands import diagnosis
+from graspatlas.commands.diagnosis import NOTE, OK, PROBLEM, Finding, diagnose, redundant_joints, report
 from graspatlas.problem_files import ProblemFileError, json_schema, read_problem
 from graspatlas.problem_files.reading import FILL_IN
 from graspatlas.problems import problem_text
+from graspatlas.requirements.collision import CollisionChecker
 
 
 def found(problem: ga.Problem, subject: str, **options) -> Finding:

@@ -16,7 +16,7 @@ import pytest
 
 import graspatlas as ga
 from graspatlas import _core
-from graspatlas.checkpoints import CheckpointFolder, run_digest
+from graspatlas.atlas.checkpoints import CheckpointFolder, run_digest
 from graspatlas.cli import main
 
 
@@ -67,7 +67,7 @@ def test_a_run_in_many_pieces_is_the_same(dimension: int) -> None:
 def test_a_killed_run_goes_on(tmp_path: Path) -> None:
     """kill -9 in the middle of a run that keeps checkpoints often."""
     program = (
-        "import sys, graspatlas as ga, graspatlas.growth as growth\n"
+        "import sys, graspatlas as ga, graspatlas.atlas.growth as growth\n"
         "growth._CHECKPOINT_SECONDS = growth._SLICE_SECONDS = 0.02\n"
         "problem = ga.load_problem('schunk_can')\n"
         "print('ready', flush=True)\n"

@@ -12,9 +12,9 @@ from helpers import PythonSphere
 import graspatlas as ga
 from graspatlas import _core
 from graspatlas.atlas import BOX_TAG, Closed
-from graspatlas.checks import Check, check_atlas, check_result
+from graspatlas.atlas.coverage import measure_coverage
 from graspatlas.cli import main
-from graspatlas.coverage import measure_coverage
+from graspatlas.result.verification import Check, check_atlas, check_result
 from graspatlas.systems import Sphere
 
 

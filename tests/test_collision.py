@@ -13,7 +13,7 @@ import pytest
 from collision_oracle import CLEARANCE, DEPTH, DOUBT, Oracle, made_grasps, made_problem
 
 import graspatlas as ga
-from graspatlas.collision import CollisionChecker
+from graspatlas.requirements.collision import CollisionChecker
 
 HANDS = {1: "s", 5: "scbms", 17: "scbmh" * 4, 32: "scbm" * 8, 70: "scbbm" * 14}
 #: Shapes of the hand, of the object, and of the fingertip.
@@ -111,7 +111,7 @@ import sys
 from pathlib import Path
 sys.path.insert(0, {tests!r})
 from collision_oracle import made_problem, touching_grasps
-from graspatlas.collision import CollisionChecker
+from graspatlas.requirements.collision import CollisionChecker
 made = made_problem(Path({folder!r}), "scbm" * 8, "c", "h")
 X, answers = touching_grasps(made, 300), set()
 for _ in range(100):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import graspatlas as ga
-from graspatlas.local_search import climb
+from graspatlas.analysis.climb import climb
 from graspatlas.viewer import figures
 from graspatlas.viewer.figures.ellipse import extreme_semi_axes
 from graspatlas.viewer.figures.indices import SINGULAR_BELOW, with_index

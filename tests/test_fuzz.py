@@ -21,9 +21,9 @@ from hypothesis import strategies as st
 
 import graspatlas as ga
 from graspatlas import patches, quality, requirements
-from graspatlas.checks import check_atlas
+from graspatlas.atlas.coverage import measure_coverage
 from graspatlas.cli import main
-from graspatlas.coverage import measure_coverage
+from graspatlas.result.verification import check_atlas
 from graspatlas.systems import Angles, Rotations, Sphere, Torus
 
 # A test that hangs, even inside compiled code, ends the run with the stack of where it hangs [s].

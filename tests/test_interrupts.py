@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 import graspatlas as ga
-from graspatlas import interrupts
-from graspatlas.interrupts import SAME_PRESS, hear, held, keeping, stoppable, stopped_by, stopping
+from graspatlas.support import interrupts
+from graspatlas.support.interrupts import SAME_PRESS, hear, held, keeping, stoppable, stopped_by, stopping
 
 CTRL_C, TERMINATE = signal.SIGINT, signal.SIGTERM
 #: After the first signal; what is left to do then takes a fraction of it on an idle machine [s].
@@ -30,7 +30,7 @@ READY = """
 import sys
 import threading
 import graspatlas as ga
-from graspatlas.growth import Growth
+from graspatlas.atlas.growth import Growth
 
 def ready():
     print("charts", file=sys.stderr, flush=True)

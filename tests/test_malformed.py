@@ -19,11 +19,11 @@ import yaml
 
 import graspatlas as ga
 from graspatlas.cli import main
-from graspatlas.mesh_files import check_meshes
+from graspatlas.hand.mesh_files import check_meshes
+from graspatlas.hand.urdf import box_urdf, mesh_urdf
 from graspatlas.problem_files.documents import MOST_LEVELS, DocumentError, parse
 from graspatlas.problems import problem_text
-from graspatlas.urdf import box_urdf, mesh_urdf
-from graspatlas.viewer.meshes import box
+from graspatlas.viewer.scene.meshes import box
 
 QUICK = ["--max-charts", "20", "--max-seconds", "2"]
 

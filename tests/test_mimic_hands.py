@@ -10,7 +10,8 @@ from scipy.spatial import ConvexHull
 from test_robots import load_script
 
 import graspatlas as ga
-from graspatlas import quality, wrenches
+from graspatlas import quality
+from graspatlas.quality import wrenches
 from graspatlas.requirements import parse_requirement, requirement_from_dict
 
 FRICTION, TORSIONAL = 0.5, 0.005

@@ -11,8 +11,8 @@ from helpers import chain, robot
 
 import graspatlas as ga
 from graspatlas.cli import main
-from graspatlas.diagnosis import diagnose
-from graspatlas.mimics import Mimic
+from graspatlas.commands.diagnosis import diagnose
+from graspatlas.hand.mechanism import Mimic
 
 AXES = ["0 0 1", "0 1 0", "0.3 1 0.2", "0 1 0"]
 

@@ -16,9 +16,9 @@ from screens import browse, pixels, share
 
 import graspatlas as ga
 from graspatlas.viewer import export_html, save_picture, view
-from graspatlas.viewer.film import Film
-from graspatlas.viewer.film_page import film_animation
-from graspatlas.viewer.live import close
+from graspatlas.viewer.scene.animation import Film
+from graspatlas.viewer.web.animation_page import film_animation
+from graspatlas.viewer.web.browser import close
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def test_view_ends_cleanly_when_interrupted(can_result: ga.Result, monkeypatch: 
     def interrupt(seconds: float) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("graspatlas.viewer.live.time.sleep", interrupt)
+    monkeypatch.setattr("graspatlas.viewer.web.browser.time.sleep", interrupt)
     visualizer = view(can_result, open_browser=False)
     assert not visualizer.window.server.running
 

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
 import graspatlas as ga
+from graspatlas.analysis.pareto import knee, values_of
 from graspatlas.cli import main
-from graspatlas.pareto import knee, values_of
 
 Array = NDArray[np.float64]
 VOLUME, CONDITION = "manipulability_volume", "inverse_condition_number"

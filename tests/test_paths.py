@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 import graspatlas as ga
-from graspatlas import shortening
 from graspatlas.requirements import screen
+from graspatlas.systems import geodesic
 
 Array = NDArray[np.float64]
 HEIGHT = 0.5  # of the plane beyond which the cap of a sphere is cut off
@@ -129,8 +129,8 @@ def test_a_chain_hugs_what_is_not_allowed() -> None:
     """The same cap, known only by asking."""
     system = ga.systems.Sphere(3)
     wide = [START, unit(-0.2, 0.6, 0.8), unit(-0.2, -0.6, 0.8), END]
-    pieces = [shortening.bridge(system, a, b, 0.01) for a, b in pairwise(wide)]
-    chain = shortening.evenly(system, np.concatenate([p for p in pieces if p is not None]), 0.01)
+    pieces = [geodesic.bridge(system, a, b, 0.01) for a, b in pairwise(wide)]
+    chain = geodesic.evenly(system, np.concatenate([p for p in pieces if p is not None]), 0.01)
     assert chain is not None
     asked = []
 
@@ -138,23 +138,23 @@ def test_a_chain_hugs_what_is_not_allowed() -> None:
         asked.append(len(X))
         return np.asarray(X[:, 0] <= HEIGHT)
 
-    tight, done = shortening.shorten(system, chain, reach=0.1, longest=0.015, allowed=allowed)
+    tight, done = geodesic.shorten(system, chain, reach=0.1, longest=0.015, allowed=allowed)
     assert done
     assert allowed(tight).all()
-    length = shortening.arc_lengths(system, tight)[-1]
+    length = geodesic.arc_lengths(system, tight)[-1]
     assert length == pytest.approx(around_cap(START, END, np.array([1.0, 0.0, 0.0]), HEIGHT), rel=2e-3)
-    assert length < 0.97 * shortening.arc_lengths(system, chain)[-1]
+    assert length < 0.97 * geodesic.arc_lengths(system, chain)[-1]
 
 
 def test_points_that_are_far_apart_are_not_bridged(sphere: ga.Atlas) -> None:
-    assert shortening.bridge(sphere.system, unit(0, 0, 1), unit(0, 0, -1), 0.01) is None
+    assert geodesic.bridge(sphere.system, unit(0, 0, 1), unit(0, 0, -1), 0.01) is None
 
 
 def test_interrupted_shortening_leaves_a_path(sphere: ga.Atlas, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(shortening, "_pulled", interrupt)
+    monkeypatch.setattr(geodesic, "_pulled", interrupt)
     path = ga.shortest_path(sphere, 0, 300)
     assert not path.tight
     assert path.length > np.arccos(sphere.centers[0] @ sphere.centers[300])
@@ -193,9 +193,9 @@ def test_pulling_shortens_the_graph_path_and_ends(can_result: ga.Result) -> None
     path = ga.shortest_path(can_result, can_result.worst.chart)
     assert_sound(path, 0.1 * can_result.atlas.radius)
     centres = can_result.atlas.centers[list(dict.fromkeys(path.charts.tolist()))]
-    assert path.length < shortening.arc_lengths(can_result.atlas.system, centres)[-1]
-    again, _ = shortening.shorten(can_result.atlas.system, path.x, reach=0.17, longest=0.03)
-    assert shortening.arc_lengths(can_result.atlas.system, again)[-1] > 0.999 * path.length
+    assert path.length < geodesic.arc_lengths(can_result.atlas.system, centres)[-1]
+    again, _ = geodesic.shorten(can_result.atlas.system, path.x, reach=0.17, longest=0.03)
+    assert geodesic.arc_lengths(can_result.atlas.system, again)[-1] > 0.999 * path.length
 
 
 def test_a_path_goes_round_a_hole(can: ga.Problem) -> None:

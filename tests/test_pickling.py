@@ -14,9 +14,9 @@ from helpers import PythonSphere, Written, tripod_problem
 
 import graspatlas as ga
 from graspatlas import _core, patches
-from graspatlas.checks import check_atlas
+from graspatlas.analysis.densify import densify
 from graspatlas.quality import evaluate
-from graspatlas.sampling import densify
+from graspatlas.result.verification import check_atlas
 from graspatlas.systems import Angles, AnySystem, Rotations, Sphere, Torus
 
 COPIES = {"pickled": lambda thing: pickle.loads(pickle.dumps(thing)), "deep": copy.deepcopy, "shallow": copy.copy}

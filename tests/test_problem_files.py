@@ -14,12 +14,12 @@ import pytest
 from helpers import DATA, chain, robot
 
 import graspatlas as ga
+from graspatlas.hand.robot_files import described_robot, example_robot
 from graspatlas.patches import patch_types
 from graspatlas.problem_files import ProblemFileError, documents, json_schema, read_problem
 from graspatlas.problem_files.schema import ProblemTable
 from graspatlas.problems import problem_text
 from graspatlas.requirements import requirement_from_dict
-from graspatlas.robot_files import described_robot, example_robot
 
 BUNDLED, _, ROBOTS = problem_text("schunk_can")
 #: The can without the requirements at its end, so that cases can state their own.

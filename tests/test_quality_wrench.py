@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 from test_requirements import margin_by_linear_programming, symmetric_planar_problem
 
 import graspatlas as ga
-from graspatlas import quality, wrenches
+from graspatlas import quality
+from graspatlas.quality import wrenches
 from graspatlas.requirements import ForceClosure
 
 Array = NDArray[np.float64]

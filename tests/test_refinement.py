@@ -11,7 +11,7 @@ import pytest
 
 import graspatlas as ga
 from graspatlas.cli import main
-from graspatlas.collision import CollisionChecker
+from graspatlas.requirements.collision import CollisionChecker
 
 HOLDS = (ga.ForceClosure(0.5, 0.02), ga.CollisionFree())
 #: Largest difference of refined bests that started from atlases of two radii.
@@ -173,7 +173,7 @@ def test_an_interrupted_refinement_keeps_what_it_has(monkeypatch: pytest.MonkeyP
             raise KeyboardInterrupt
         return ga.climb(*arguments, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("graspatlas.refinement.climb", impatient)
+    monkeypatch.setattr("graspatlas.analysis.refine.climb", impatient)
     first = ga.refine(result)
     assert not first.complete
     assert first.n_peaks == 1
@@ -191,7 +191,7 @@ def test_an_interrupted_climb_in_f_keeps_those_in_r(monkeypatch: pytest.MonkeyPa
             raise KeyboardInterrupt
         return ga.climb(*arguments, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("graspatlas.refinement.climb", impatient)
+    monkeypatch.setattr("graspatlas.analysis.refine.climb", impatient)
     kept = ga.refine(result, all_motions=True)
     assert not kept.complete
     np.testing.assert_array_equal(kept.qualities, inside.qualities)

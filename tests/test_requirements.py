@@ -12,8 +12,8 @@ from helpers import margin_by_linear_programming
 from numpy.typing import NDArray
 
 import graspatlas as ga
-from graspatlas.collision import CollisionChecker
 from graspatlas.requirements import parse_requirement, requirement_name
+from graspatlas.requirements.collision import CollisionChecker
 
 Array = NDArray[np.float64]
 

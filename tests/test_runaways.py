@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 import graspatlas as ga
+from graspatlas.analysis.runaways import climbs_a_needle, followed, is_sharp, levels_around, never_levels_off
 from graspatlas.cli import main
-from graspatlas.runaways import climbs_a_needle, followed, is_sharp, levels_around, never_levels_off
 
 Array = NDArray[np.float64]
 Index = Callable[[ga.Grasps], Array]

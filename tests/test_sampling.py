@@ -16,8 +16,8 @@ from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 
 import graspatlas as ga
+from graspatlas.analysis.densify import Grid, _nearest_points, densify, jumps, lay_grid, most_samples
 from graspatlas.cli import main
-from graspatlas.sampling import Grid, _nearest_points, densify, jumps, lay_grid, most_samples
 
 Array = NDArray[np.float64]
 
@@ -266,7 +266,7 @@ def test_a_share_fills_the_charts_that_jump_most(small_result: ga.Result) -> Non
 
 
 def test_interrupted_work_is_kept(small_result: ga.Result, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("graspatlas.sampling.BLOCK", 40)
+    monkeypatch.setattr("graspatlas.analysis.densify.BLOCK", 40)
     whole = densify(small_result, 0.05)
     calls = []
 

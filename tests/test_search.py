@@ -14,10 +14,10 @@ from helpers import PythonSphere, Written, tripod_problem
 from scipy.spatial.transform import Rotation
 
 import graspatlas as ga
-from graspatlas.diagnosis import diagnose
-from graspatlas.guessed_starts import starts_near
+from graspatlas.commands.diagnosis import diagnose
 from graspatlas.search import GraspSearch
-from graspatlas.starts import Starts, _best_motion
+from graspatlas.search.random_starts import Starts, _best_motion
+from graspatlas.search.starts_near_guess import starts_near
 
 PROBLEMS = ("planar_hand", "schunk_can", "schunk_oil_bottle")
 
@@ -405,7 +405,9 @@ def test_only_the_first_grasp_is_sought_near_the_guess(monkeypatch):
     """Other grasps are found as without a guess, and x1 is as good as one."""
     yielded = []
     near = starts_near
-    monkeypatch.setattr("graspatlas.search.starts_near", lambda *a: map(lambda x: yielded.append(x) or x, near(*a)))
+    monkeypatch.setattr(
+        "graspatlas.search.find_grasps.starts_near", lambda *a: map(lambda x: yielded.append(x) or x, near(*a))
+    )
     assert len(ga.find_grasps(guessed("schunk_can"), count=5)) == 5
     used = len(yielded)
     assert 0 < used <= 20

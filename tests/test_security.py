@@ -20,12 +20,12 @@ import numpy as np
 import pytest
 
 import graspatlas as ga
-from graspatlas.archives import DamagedArchive, read_arrays
 from graspatlas.cli import main
-from graspatlas.files import replaced
-from graspatlas.terminal import printable
+from graspatlas.support.archives import DamagedArchive, read_arrays
+from graspatlas.support.files import replaced
+from graspatlas.support.terminal import printable
 from graspatlas.viewer import export_html, save_picture, view
-from graspatlas.viewer.live import close
+from graspatlas.viewer.web.browser import close
 
 #: Modules of the standard library, and others, that the viewer or a worker imports.
 PLANTED = ("html", "secrets", "pickle", "socket", "multiprocessing", "tornado", "zmq", "numpy", "base64", "selectors")
@@ -103,12 +103,13 @@ def test_the_workers_of_a_sweep_run_nothing_of_the_current_folder(
     if knows_safe_path and sys.version_info < (3, 11):
         pytest.skip("this version of Python knows no safe path")
     script = Path(command[1])
-    known = f"import graspatlas.sweep\ngraspatlas.sweep.KNOWS_SAFE_PATH = {knows_safe_path}\n"
+    known = f"import graspatlas.sweep.sweep\ngraspatlas.sweep.sweep.KNOWS_SAFE_PATH = {knows_safe_path}\n"
     text = script.read_text().replace("if __name__", f"{known}if __name__")
     if not knows_safe_path:
         text = text.replace(
-            "graspatlas.sweep.KNOWS",
-            "graspatlas.sweep._safe_path = lambda: __import__('contextlib').nullcontext()\ngraspatlas.sweep.KNOWS",
+            "graspatlas.sweep.sweep.KNOWS",
+            "graspatlas.sweep.sweep._safe_path = lambda: __import__('contextlib').nullcontext()\n"
+            "graspatlas.sweep.sweep.KNOWS",
         )
     script.write_text(text)
     words = ["sweep", "planar_hand", "--radius", "0.4", "--workers", "1", "--output", str(tmp_path / "out"), "--json"]

@@ -8,8 +8,8 @@ from helpers import PythonSphere, Written
 
 import graspatlas as ga
 from graspatlas import _core
-from graspatlas.checks import check_atlas
-from graspatlas.growth import Growth, available_bytes, available_threads, outlook
+from graspatlas.atlas.growth import Growth, available_bytes, available_threads, outlook
+from graspatlas.result.verification import check_atlas
 from graspatlas.systems import Angles, Rotations, Sphere
 
 SPHERE = {"radius": 0.1, "epsilon": 0.1}

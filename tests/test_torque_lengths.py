@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 import graspatlas as ga
 from graspatlas import patches, quality
+from graspatlas.problem.torque_lengths import largest_arm
 from graspatlas.problem_files import read_problem
 from graspatlas.problems import problem_text
-from graspatlas.torque_lengths import largest_arm
 
 Array = NDArray[np.float64]
 TIP = patches.Point((0, 0, 0), (0, 0, 1))
@@ -97,7 +97,7 @@ def test_a_file_is_checked_with_the_length_that_it_was_made_with(
 ) -> None:
     result = ga.optimize(ga.load_problem("three_finger_cup"), radius=0.3)
     result.save(tmp_path / "cup.npz")
-    monkeypatch.setattr("graspatlas.problem.largest_arm", lambda *_: 1.0)  # another rule, some day
+    monkeypatch.setattr("graspatlas.problem.problem.largest_arm", lambda *_: 1.0)  # another rule, some day
     again = ga.load_result(tmp_path / "cup.npz")
     assert again.problem.torque_arm == result.problem.torque_arm != 1.0
     assert again.check().passed

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 import graspatlas as ga
 from graspatlas import _core
+from graspatlas.analysis.densify import densify
 from graspatlas.quality import INDICES, evaluate
-from graspatlas.sampling import densify
 
 THREADS = 4
 #: Requirements are left out: their collision checks take most of the time.

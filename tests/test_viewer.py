@@ -15,11 +15,12 @@ from scipy.spatial import cKDTree
 from screens import pixels, share
 
 import graspatlas as ga
-from graspatlas.viewer import bodies, ellipsoid, export_html, meshes, save_picture, sketch
-from graspatlas.viewer.picture import WINDOW
-from graspatlas.viewer.raster import nearest
-from graspatlas.viewer.scene import CONTACT_RADIUS, Scene, vertices_of
-from graspatlas.viewer.shading import to_linear, to_screen
+from graspatlas.viewer import export_html, save_picture
+from graspatlas.viewer.render.picture import WINDOW
+from graspatlas.viewer.render.raster import nearest
+from graspatlas.viewer.render.shading import to_linear, to_screen
+from graspatlas.viewer.scene import bodies, meshes, stick_figure, velocity_ellipsoid
+from graspatlas.viewer.scene.scene import CONTACT_RADIUS, Scene, vertices_of
 
 Array = NDArray[np.float64]
 
@@ -151,7 +152,7 @@ def test_a_body_without_shapes_is_sketched(planar: ga.Result, tmp_path: Path) ->
 
 
 def test_a_planar_ellipsoid_is_flat(planar: ga.Result) -> None:
-    axes, semi_axes = ellipsoid.velocity_ellipsoid(planar.best)
+    axes, semi_axes = velocity_ellipsoid.velocity_ellipsoid(planar.best)
     assert_allclose(np.abs(axes[:, 2]), [0.0, 0.0, 1.0], atol=1e-12)
     assert semi_axes[1] > 0.0
     assert semi_axes[2] == 0.0
@@ -164,7 +165,7 @@ def test_sheets_and_curves_are_sketched(planar: ga.Result) -> None:
     sheet = replace(contact.object, v_interval=(0.0, 0.1))  # type: ignore[call-arg]
     for frozen, expected in (({}, 1), ({"v": 0.0}, 1), ({"u": 1.6, "v": 0.0}, 0)):
         contacts = (replace(contact, object=sheet, frozen=frozen),)
-        shapes = list(sketch.outlines(replace_contacts(planar.problem, contacts)))
+        shapes = list(stick_figure.outlines(replace_contacts(planar.problem, contacts)))
         assert len(shapes) == expected
         for mesh, _, _ in shapes:
             across = np.linalg.norm(mesh.vertices[:, :2] - contact.object.origin[:2], axis=1)  # type: ignore[attr-defined]
@@ -230,9 +231,9 @@ def test_grasps_stand_apart_and_inside_the_window(result: ga.Result) -> None:
 def test_ellipsoid_holds_all_velocities_and_is_touched(result: ga.Result) -> None:
     random = np.random.default_rng(0)
     for grasp in (result.best, result.worst, result.at_x1):
-        axes, semi_axes = ellipsoid.velocity_ellipsoid(grasp)
+        axes, semi_axes = velocity_ellipsoid.velocity_ellipsoid(grasp)
         assert np.linalg.det(axes) == pytest.approx(1.0)
-        twists, joints = ellipsoid.coordinated_motions(grasp)
+        twists, joints = velocity_ellipsoid.coordinated_motions(grasp)
         # Coordinated: the contact points of the fingers move with those of the object.
         assert_allclose(grasp.J @ joints, grasp.G.T @ twists, atol=1e-6 * np.abs(twists).max())
         z = random.normal(size=(twists.shape[1], 20000))
@@ -249,12 +250,12 @@ def test_ellipsoid_agrees_with_the_formula_of_full_rank(result: ga.Result) -> No
     grasp = result.at_x1
     M = grasp.G @ np.linalg.inv(grasp.J @ grasp.J.T) @ grasp.G.T
     expected = np.sqrt(np.linalg.eigvalsh(np.linalg.inv(M)[:3, :3]))[::-1]
-    assert_allclose(ellipsoid.velocity_ellipsoid(grasp)[1], expected, rtol=1e-5)
+    assert_allclose(velocity_ellipsoid.velocity_ellipsoid(grasp)[1], expected, rtol=1e-5)
 
 
 def test_ellipsoid_agrees_with_the_semi_axes_of_the_index(result: ga.Result) -> None:
     grasp = result.at_x1
-    twists = ellipsoid.coordinated_motions(grasp)[0]
+    twists = velocity_ellipsoid.coordinated_motions(grasp)[0]
     twists[:3] *= 1000.0
     lengths = np.linalg.svd(twists, compute_uv=False)
     assert_allclose(np.sort(lengths), grasp.semi_axes, rtol=1e-5)
@@ -272,7 +273,7 @@ def test_ellipsoid_of_a_deficient_grasp_is_finite(can_result: ga.Result, loss: s
         J[:3] = 0.0
     else:
         J = J[:, :1]
-    axes, semi_axes = ellipsoid.velocity_ellipsoid(replace(grasp, J=J, G=G))
+    axes, semi_axes = velocity_ellipsoid.velocity_ellipsoid(replace(grasp, J=J, G=G))
     assert np.isfinite(axes).all()
     assert np.isfinite(semi_axes).all()
     assert (semi_axes >= 0.0).all()

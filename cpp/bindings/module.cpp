@@ -16,7 +16,7 @@ const double* checked_vector(const DoubleArray& array, pybind11::ssize_t size, c
 }
 
 Reduced reduced(const pybind11::object& self, const pybind11::type& base, const pybind11::tuple& arguments) {
-  return pybind11::module_::import("graspatlas.pickling").attr("reduced")(self, base, arguments);
+  return pybind11::module_::import("graspatlas.support.pickling").attr("reduced")(self, base, arguments);
 }
 
 }  // namespace graspatlas

@@ -5,31 +5,34 @@ from graspatlas import start_up as start_up  # first: the others take a second  
 import importlib
 import typing
 
-from graspatlas import libraries, motions, patches, quality, systems  # noqa: F401  (libraries first: it loads the compiled core)
-from graspatlas.atlas import Atlas, Closed, Status
-from graspatlas.components import Components, SearchStatus, find_components
-from graspatlas.contacts import Contact
+from graspatlas import libraries, patches, quality, systems  # noqa: F401  (libraries first: it loads the compiled core)
+from graspatlas.analysis.climb import Climb, Peak, climb, local_maxima, peaks_of
+from graspatlas.analysis.densify import Samples, densify
+from graspatlas.analysis.pareto import pareto_front
+from graspatlas.analysis.refine import refine
+from graspatlas.atlas.atlas import Atlas, Closed, Status
 from graspatlas.errors import GraspAtlasError
-from graspatlas.first_grasp import FirstGrasp
-from graspatlas.grasps import Grasp, Grasps
-from graspatlas.hand import Body, Hand
-from graspatlas.local_search import Climb, Peak, climb, local_maxima, peaks_of
-from graspatlas.motions import HandMotions
-from graspatlas.optimizer import build_atlas, optimize
-from graspatlas.pareto import pareto_front
-from graspatlas.paths import GraspPath, Path
-from graspatlas.pose_guess import PoseGuess
-from graspatlas.problem import Problem
+from graspatlas.grasps.grasps import Grasp, Grasps
+from graspatlas.hand import motions
+from graspatlas.hand.hand import Body, Hand
+from graspatlas.hand.motions import HandMotions
+from graspatlas.optimizer.components import Components, SearchStatus, find_components
+from graspatlas.optimizer.optimize import build_atlas, optimize
+from graspatlas.paths.path import GraspPath, Path
+from graspatlas.paths.shortest_path import shortest_path
+from graspatlas.problem.contacts import Contact
+from graspatlas.problem.first_grasp import FirstGrasp
+from graspatlas.problem.pose_guess import PoseGuess
+from graspatlas.problem.problem import Problem
 from graspatlas.problems import bundled_problems, load_problem
-from graspatlas.projection import project
-from graspatlas.quality import batched
-from graspatlas.refinement import Refinement, refine
-from graspatlas.requirements import CollisionFree, ForceClosure, JointMargin
-from graspatlas.result import Result, load_result
-from graspatlas.sampling import Samples, densify
-from graspatlas.search import find_grasps
-from graspatlas.shortest_paths import shortest_path
-from graspatlas.systems import System
+from graspatlas.quality.evaluation import batched
+from graspatlas.requirements.screening import CollisionFree, ForceClosure, JointMargin
+from graspatlas.result.refinement import Refinement
+from graspatlas.result.result import Result, load_result
+from graspatlas.search.find_grasps import find_grasps
+from graspatlas.systems.projection import project
+from graspatlas.systems.system import System
+from graspatlas.version import __version__ as __version__
 from graspatlas.viewer import export_html, save_picture, view
 
 if typing.TYPE_CHECKING:
@@ -44,8 +47,6 @@ if typing.TYPE_CHECKING:
         plot_planar_grasp,
         plot_planar_indices,
     )
-
-__version__ = "0.1.0"
 
 __all__ = [
     "Atlas",

@@ -14,26 +14,26 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from graspatlas import __version__
-from graspatlas.atlas import Status
-from graspatlas.checkpoints import CheckpointFolder
-from graspatlas.components import Components, SearchStatus, find_components
+from graspatlas.analysis.climb import MAX_STEPS
+from graspatlas.atlas.atlas import Status
+from graspatlas.atlas.checkpoints import CheckpointFolder
+from graspatlas.commands.arguments import path_word
+from graspatlas.commands.exit_status import FAILED, INTERRUPTED, MISUSE
+from graspatlas.commands.problem import add_problem_commands
+from graspatlas.commands.result import add_result_commands
 from graspatlas.errors import GraspAtlasError
-from graspatlas.exit_status import FAILED, INTERRUPTED, MISUSE
-from graspatlas.files import replaced, writable_folder
-from graspatlas.interrupts import stoppable, stopped_by
-from graspatlas.local_search import MAX_STEPS
-from graspatlas.optimizer import optimize
-from graspatlas.problem_commands import add_problem_commands
+from graspatlas.optimizer.components import Components, SearchStatus, find_components
+from graspatlas.optimizer.optimize import optimize
 from graspatlas.problems import bundled_problems, load_problem
-from graspatlas.quality import INDICES, quality_name
-from graspatlas.refinement import Refinement
-from graspatlas.requirements import REQUIREMENTS, parse_requirement
-from graspatlas.result import Result
-from graspatlas.result_commands import add_result_commands
+from graspatlas.quality.evaluation import INDICES, quality_name
+from graspatlas.requirements.screening import REQUIREMENTS, parse_requirement
+from graspatlas.result.refinement import Refinement
+from graspatlas.result.result import Result
 from graspatlas.start_up import hear_interrupts
-from graspatlas.terminal import finish_output, printable, say, shortened, silence_output
-from graspatlas.words import path_word
+from graspatlas.support.files import replaced, writable_folder
+from graspatlas.support.interrupts import stoppable, stopped_by
+from graspatlas.support.terminal import finish_output, printable, say, shortened, silence_output
+from graspatlas.version import __version__
 
 __all__ = ["main"]
 
@@ -375,7 +375,7 @@ def _row(values: NDArray[np.float64]) -> str:
 
 
 def _sweep(options: argparse.Namespace) -> int:
-    from graspatlas.sweep import run_sweep  # slow to import
+    from graspatlas.sweep.sweep import run_sweep  # slow to import
 
     sweep = run_sweep(
         options.problems,

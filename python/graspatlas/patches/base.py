@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
-from graspatlas.tables import number, number_array
+from graspatlas.support.validation import number, number_array
 
 __all__ = ["AxialPatch", "FlippablePatch", "Patch"]
 

@@ -14,9 +14,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.files import is_file
 from graspatlas.patches.base import Array, Vector3, checked_length, checked_vector, placement
 from graspatlas.patches.spline import BSpline, clamped_knots
+from graspatlas.support.files import is_file
 
 __all__ = ["FitReport", "patch_from_mesh"]
 

@@ -13,7 +13,7 @@ from graspatlas.patches.flat import Plane, Point
 from graspatlas.patches.round import Ellipsoid, Sphere, Torus
 from graspatlas.patches.spline import Bezier, BSpline
 from graspatlas.patches.turned import Cone, Cylinder, Revolution
-from graspatlas.tables import shown
+from graspatlas.support.validation import shown
 
 __all__ = ["patch_from_dict", "patch_types"]
 

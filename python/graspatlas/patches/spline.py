@@ -13,7 +13,7 @@ from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.patches.base import LARGEST, Array, FlippablePatch, Interval, Vector3, checked_interval
 from graspatlas.patches.nearest import nearest_parameters
-from graspatlas.tables import number_array
+from graspatlas.support.validation import number_array
 
 __all__ = ["BSpline", "Bezier"]
 

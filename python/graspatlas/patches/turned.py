@@ -21,7 +21,7 @@ from graspatlas.patches.base import (
     checked_length,
     checked_pair,
 )
-from graspatlas.tables import number_array
+from graspatlas.support.validation import number_array
 
 __all__ = ["Cone", "Cylinder", "Revolution"]
 

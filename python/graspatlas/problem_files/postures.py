@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from graspatlas.archives import DamagedArchive, read_arrays
 from graspatlas.errors import GraspAtlasError
-from graspatlas.files import opened, read_text
+from graspatlas.support.archives import DamagedArchive, read_arrays
+from graspatlas.support.files import opened, read_text
 
 __all__ = ["read_postures"]
 

@@ -11,20 +11,20 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from graspatlas.contacts import Contact
 from graspatlas.errors import GraspAtlasError, unknown_name
-from graspatlas.hand import Body, Hand
-from graspatlas.motions import HandMotions, coupling_rows
+from graspatlas.hand.hand import Body, Hand
+from graspatlas.hand.motions import HandMotions, coupling_rows
+from graspatlas.hand.robot_files import described_robot, example_robot, find_file
+from graspatlas.hand.urdf import box_urdf, cylinder_urdf, mesh_urdf, moving_joints, sphere_urdf
 from graspatlas.patches import patch_from_dict
-from graspatlas.pose_guess import PoseGuess
-from graspatlas.problem import Problem
+from graspatlas.problem.contacts import Contact
+from graspatlas.problem.pose_guess import PoseGuess
+from graspatlas.problem.problem import Problem
 from graspatlas.problem_files import documents
 from graspatlas.problem_files.faults import ProblemFileError, faults_of_validation, narrowed, one_line
 from graspatlas.problem_files.postures import read_postures
 from graspatlas.problem_files.schema import HandTable, MotionsTable, ObjectTable, ProblemTable
-from graspatlas.requirements import requirement_from_dict
-from graspatlas.robot_files import described_robot, example_robot, find_file
-from graspatlas.urdf import box_urdf, cylinder_urdf, mesh_urdf, moving_joints, sphere_urdf
+from graspatlas.requirements.screening import requirement_from_dict
 
 __all__ = ["FILL_IN", "read_problem"]
 

@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal, Union, get_type_hints
 from pydantic import BeforeValidator, Field, create_model, model_validator
 
 from graspatlas.patches import Patch, patch_types
-from graspatlas.problem_files.tables import Finite, Table, exactly_one, known_name, table_of
-from graspatlas.quality import INDICES
-from graspatlas.requirements import REQUIREMENTS
+from graspatlas.problem_files.schema_tables import Finite, Table, exactly_one, known_name, table_of
+from graspatlas.quality.evaluation import INDICES
+from graspatlas.requirements.screening import REQUIREMENTS
 
 __all__ = ["ProblemTable", "json_schema"]
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.files import is_file
-from graspatlas.hand import Hand
+from graspatlas.hand.hand import Hand
+from graspatlas.hand.robot_files import described_robot, example_robot, find_file
 from graspatlas.patches import patch_types
 from graspatlas.problem_files.reading import FILL_IN
-from graspatlas.robot_files import described_robot, example_robot, find_file
+from graspatlas.support.files import is_file
 
 __all__ = ["problem_template"]
 

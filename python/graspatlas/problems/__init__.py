@@ -6,9 +6,9 @@ from importlib import resources
 from pathlib import Path
 
 from graspatlas.errors import GraspAtlasError, unknown_name
-from graspatlas.files import is_file, read_text
-from graspatlas.problem import Problem
-from graspatlas.robot_files import robots_folder
+from graspatlas.hand.robot_files import robots_folder
+from graspatlas.problem.problem import Problem
+from graspatlas.support.files import is_file, read_text
 
 __all__ = ["bundled_problems", "load_problem", "problem_text"]
 

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from graspatlas.grasps import Grasps
-from graspatlas.problem import Problem
-from graspatlas.quality import evaluate
-from graspatlas.result import Result
+from graspatlas.grasps.grasps import Grasps
+from graspatlas.problem.problem import Problem
+from graspatlas.quality.evaluation import evaluate
+from graspatlas.result.result import Result
 
 __all__ = ["Multistart", "multistart"]
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from tqdm import tqdm
 
-from graspatlas.local_search import Climb, climb, peaks_of
+from graspatlas.analysis.climb import Climb, climb, peaks_of
 from graspatlas.reproduce.report import Number
-from graspatlas.result import Result
+from graspatlas.result.result import Result
 
 __all__ = ["MAX_STEPS", "SEED", "STARTS", "Study", "study"]
 

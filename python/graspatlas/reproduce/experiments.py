@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 
-from graspatlas.atlas import Status
-from graspatlas.optimizer import build_atlas
+from graspatlas.atlas.atlas import Status
+from graspatlas.optimizer.optimize import build_atlas
 from graspatlas.reproduce.climbing import MAX_STEPS, Study, study
 from graspatlas.reproduce.findings import (
     add_box_starts,
@@ -18,8 +18,8 @@ from graspatlas.reproduce.findings import (
 )
 from graspatlas.reproduce.report import Claim, Number, Plate, Section
 from graspatlas.reproduce.runs import Setting, numbers_of, run
-from graspatlas.result import Result
-from graspatlas.systems import Sphere
+from graspatlas.result.result import Result
+from graspatlas.systems.system import Sphere
 from graspatlas.viewer.figures import (
     plot_atlas,
     plot_best_and_worst,

@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from graspatlas.collision import CollisionChecker
-from graspatlas.components import find_components
-from graspatlas.grasps import Grasps
+from graspatlas.grasps.grasps import Grasps
+from graspatlas.optimizer.components import find_components
 from graspatlas.reproduce.box_starts import REACHED, multistart
 from graspatlas.reproduce.climbing import SEED
 from graspatlas.reproduce.published import RELEASED_RATIO
 from graspatlas.reproduce.report import Claim, Number, Section
 from graspatlas.reproduce.runs import Setting
-from graspatlas.requirements import CollisionFree, ForceClosure, screen
-from graspatlas.result import Result
+from graspatlas.requirements.collision import CollisionChecker
+from graspatlas.requirements.screening import CollisionFree, ForceClosure, screen
+from graspatlas.result.result import Result
 
 __all__ = [
     "add_box_starts",

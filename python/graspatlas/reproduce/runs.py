@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from graspatlas.atlas import Status
-from graspatlas.local_search import local_maxima
-from graspatlas.optimizer import optimize
+from graspatlas.analysis.climb import local_maxima
+from graspatlas.atlas.atlas import Status
+from graspatlas.optimizer.optimize import optimize
 from graspatlas.problems import load_problem
 from graspatlas.reproduce.published import PUBLISHED, WHY, Published
 from graspatlas.reproduce.report import Number
-from graspatlas.result import Result
+from graspatlas.result.result import Result
 from graspatlas.viewer.figures.indices import SINGULAR_BELOW, with_index
 
 __all__ = ["Setting", "numbers_of", "run"]

@@ -9,8 +9,8 @@ import os
 from typing import TYPE_CHECKING
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.paths import Path
-from graspatlas.result import Result
+from graspatlas.paths.path import Path
+from graspatlas.result.result import Result
 
 if TYPE_CHECKING:
     import meshcat
@@ -38,7 +38,7 @@ def view(
     Raises:
         GraspAtlasError: If a mesh cannot be read, or the page cannot be served on this address.
     """
-    from graspatlas.viewer.live import show
+    from graspatlas.viewer.web.browser import show
 
     return show(_checked(shown), open_browser=open_browser, wait=wait, host=host)
 
@@ -56,11 +56,11 @@ def export_html(shown: Result | Path, path: str | os.PathLike[str]) -> None:
     Raises:
         GraspAtlasError: If a mesh cannot be read or the file cannot be written.
     """
-    from graspatlas.files import replaced
-    from graspatlas.viewer.film import Film
-    from graspatlas.viewer.film_page import film_page
-    from graspatlas.viewer.page import page
-    from graspatlas.viewer.scene import Scene
+    from graspatlas.support.files import replaced
+    from graspatlas.viewer.scene.animation import Film
+    from graspatlas.viewer.scene.scene import Scene
+    from graspatlas.viewer.web.animation_page import film_page
+    from graspatlas.viewer.web.page import page
 
     shown = _checked(shown)
     with replaced(path) as stream:
@@ -90,11 +90,11 @@ def save_picture(
     Raises:
         GraspAtlasError: If the size is too small, a mesh cannot be read or the file cannot be written.
     """
-    from graspatlas.files import replaced
-    from graspatlas.viewer.film import Film
-    from graspatlas.viewer.picture import check_size, draw
-    from graspatlas.viewer.scene import Scene
-    from graspatlas.viewer.strip import FRAMES, draw_strip
+    from graspatlas.support.files import replaced
+    from graspatlas.viewer.render.film_strip import FRAMES, draw_strip
+    from graspatlas.viewer.render.picture import check_size, draw
+    from graspatlas.viewer.scene.animation import Film
+    from graspatlas.viewer.scene.scene import Scene
 
     if os.path.splitext(path)[1].lower() != ".png":
         raise GraspAtlasError(f"a picture's name must end in .png, not '{os.fspath(path)}'")

@@ -11,10 +11,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import ArrayLike, NDArray
 
-from graspatlas.atlas import Atlas
+from graspatlas.atlas.atlas import Atlas
 from graspatlas.errors import GraspAtlasError
-from graspatlas.quality import quality_name
-from graspatlas.result import Result
+from graspatlas.quality.evaluation import quality_name
+from graspatlas.result.result import Result
 from graspatlas.viewer.figures.polygons import Coordinates, chart_polygons, default_coordinates, open_charts
 from graspatlas.viewer.figures.style import BLUE, INK, PAGE, RED, REFUSED, SINGULAR, Picture, styled
 from graspatlas.viewer.figures.surface import View, add_axes, add_polygons, quality_colours, scale_of

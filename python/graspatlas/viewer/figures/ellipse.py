@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
-from graspatlas.grasps import Grasp
-from graspatlas.problem import Problem
+from graspatlas.grasps.grasps import Grasp
+from graspatlas.problem.problem import Problem
 from graspatlas.viewer.figures.style import COLUMN, Picture, readable, styled
 
 __all__ = ["BEST", "WORST", "draw_ellipses", "extreme_semi_axes", "plot_ellipsoid", "unit_of"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from graspatlas.result import Result
+from graspatlas.result.result import Result
 from graspatlas.viewer.figures.atlas import VIEWS, AtlasDrawing
 from graspatlas.viewer.figures.ellipse import BEST, WORST, draw_ellipses, extreme_semi_axes, unit_of
 from graspatlas.viewer.figures.planar import draw_planar_grasp

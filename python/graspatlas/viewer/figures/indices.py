@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graspatlas.grasps import Grasp, Grasps
-from graspatlas.local_search import local_maxima
-from graspatlas.quality import INDICES, batched, evaluate
-from graspatlas.result import Result
+from graspatlas.analysis.climb import local_maxima
+from graspatlas.grasps.grasps import Grasp, Grasps
+from graspatlas.quality.evaluation import INDICES, batched, evaluate
+from graspatlas.result.result import Result
 from graspatlas.viewer.figures.atlas import VIEWS, AtlasDrawing
 from graspatlas.viewer.figures.ellipse import draw_ellipses, extreme_semi_axes, unit_of
 from graspatlas.viewer.figures.planar import draw_planar_grasp, require_planar

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.ticker import MaxNLocator
 
+from graspatlas.analysis.climb import Climb, Peak, climb, local_maxima, peaks_of
 from graspatlas.errors import GraspAtlasError
-from graspatlas.local_search import Climb, Peak, climb, local_maxima, peaks_of
-from graspatlas.quality import quality_name
-from graspatlas.result import Result
+from graspatlas.quality.evaluation import quality_name
+from graspatlas.result.result import Result
 from graspatlas.viewer.figures.atlas import VIEWS, AtlasDrawing
 from graspatlas.viewer.figures.polygons import Coordinates
 from graspatlas.viewer.figures.style import INK, PAGE, Picture, readable, styled
@@ -65,7 +65,7 @@ def plot_climbs(
 
     Args:
         result: The result on which they climbed.
-        climbs: What :func:`graspatlas.local_search.climb` returned, one for each start.
+        climbs: What :func:`graspatlas.analysis.climb.climb` returned, one for each start.
         from_best: The climb from the best chart; it is made when not given.
         label: Name of the index; its own by default.
 

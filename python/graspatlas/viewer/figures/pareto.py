@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from graspatlas.pareto import knee, pareto_front, values_of
-from graspatlas.quality import Quality, quality_name
-from graspatlas.result import Result
+from graspatlas.analysis.pareto import knee, pareto_front, values_of
+from graspatlas.quality.evaluation import Quality, quality_name
+from graspatlas.result.result import Result
 from graspatlas.viewer.figures.planar import draw_planar_grasp
 from graspatlas.viewer.figures.portrait import common_direction, portrait
 from graspatlas.viewer.figures.style import BLUE, INK, PAGE, RED, REFUSED, Picture, readable, styled
@@ -35,7 +35,7 @@ def plot_pareto(result: Result, first: Quality, second: Quality) -> Picture:
 
     A dot is a chart; pale grey ones do not meet the requirements, and those beyond the others are cut off. The front
     is drawn as stairs: they bound what some grasp reaches in both indices. Its knee is that of
-    :func:`graspatlas.pareto.knee`.
+    :func:`graspatlas.analysis.pareto.knee`.
 
     Args:
         result: The result.

@@ -9,8 +9,8 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.grasps import Grasp
-from graspatlas.problem import Problem
+from graspatlas.grasps.grasps import Grasp
+from graspatlas.problem.problem import Problem
 from graspatlas.viewer.figures.style import COLUMN, INK, Picture, styled
 
 __all__ = ["draw_planar_grasp", "plot_planar_grasp", "require_planar"]

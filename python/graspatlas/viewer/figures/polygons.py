@@ -9,10 +9,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from graspatlas.atlas import Atlas, Closed
+from graspatlas.atlas.atlas import Atlas, Closed
 from graspatlas.errors import GraspAtlasError
-from graspatlas.grasps import Grasps
-from graspatlas.problem import Problem
+from graspatlas.grasps.grasps import Grasps
+from graspatlas.problem.problem import Problem
 
 __all__ = ["Coordinates", "chart_polygons", "default_coordinates", "object_pose", "open_charts", "principal"]
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from graspatlas.grasps import Grasp
-from graspatlas.problem import Problem
-from graspatlas.viewer.bodies import BodyShapes
-from graspatlas.viewer.camera import Camera
-from graspatlas.viewer.meshes import merged
-from graspatlas.viewer.raster import nearest
-from graspatlas.viewer.scene import SHOW_THROUGH, Part, grasp_parts
-from graspatlas.viewer.shading import Shadow, dots, lamps, shade, to_linear, to_screen
-from graspatlas.viewer.viewpoint import Subject, best_direction
+from graspatlas.grasps.grasps import Grasp
+from graspatlas.problem.problem import Problem
+from graspatlas.viewer.render.raster import nearest
+from graspatlas.viewer.render.shading import Shadow, dots, lamps, shade, to_linear, to_screen
+from graspatlas.viewer.scene.bodies import BodyShapes
+from graspatlas.viewer.scene.camera import Camera
+from graspatlas.viewer.scene.meshes import merged
+from graspatlas.viewer.scene.scene import SHOW_THROUGH, Part, grasp_parts
+from graspatlas.viewer.scene.viewpoint import Subject, best_direction
 
 __all__ = ["common_direction", "portrait"]
 

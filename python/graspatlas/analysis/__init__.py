@@ -1,0 +1,1 @@
+"""What is read on a result: local maxima, refined grasps, denser samples, trade-offs."""

@@ -1,0 +1,131 @@
+"""The best grasp beyond the charts' centres: climbs from the best chart of each basin, so that r no longer matters."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from graspatlas.analysis.climb import MAX_STEPS, Climb, Peak, climb, local_maxima, peaks_of
+from graspatlas.errors import GraspAtlasError
+from graspatlas.result.refinement import Refinement
+from graspatlas.search.find_grasps import deadline_after
+from graspatlas.support.interrupts import held, stoppable, stopping
+
+if TYPE_CHECKING:
+    from graspatlas.result.result import Result
+
+__all__ = ["refine"]
+
+Array = NDArray[np.float64]
+
+#: Local maxima of the atlas from which to climb, the best first.
+MOST_STARTS = 40
+#: Climbing that ends within this shows no progress bar [s].
+QUIET_SECONDS = 1.0
+
+
+@stoppable()
+def refine(
+    result: Result,
+    *,
+    all_motions: bool = False,
+    max_steps: int = MAX_STEPS,
+    max_seconds: float | None = None,
+    progress: bool | None = None,
+) -> Refinement:
+    """Climb from the best chart of each basin, on the manifold and within bounds and requirements.
+
+    A basin is what one local maximum of the index over the charts stands for. Its climb is that of
+    :func:`graspatlas.climb`; climbs that end in one place count once. Ctrl-C keeps the climbs that have ended.
+
+    What `all_motions` frees are the hand motions that k froze. What couples joints stays: the couplings of
+    ``HandMotions``, and joints that mimic others by the ``<mimic>`` tags of the hand's URDF.
+
+    Args:
+        result: The result.
+        all_motions: Go on from there in F, no hand motion frozen but the couplings.
+        max_steps: Steps after which a climb is given up.
+        max_seconds: Time after which the climbs are given up, and ``complete`` is False; none by default.
+        progress: Show a progress bar on standard error; by default when it is a terminal.
+
+    Returns:
+        The local maxima that were found.
+
+    Raises:
+        GraspAtlasError: If no grasp meets the requirements, or a requirement is a function that a file did not keep.
+
+    Source: refines the grid search of "Global Optimization of Robotic Grasps", Section IV.
+    """
+    deadline = deadline_after(max_seconds)
+    charts = local_maxima(result)[:MOST_STARTS]
+    if len(charts) == 0:
+        raise GraspAtlasError("no grasp meets the requirements, so there is none to refine: relax one")
+    shown = sys.stderr.isatty() if progress is None else progress
+    bar = tqdm(
+        total=len(charts),
+        desc="refine",
+        unit=" climbs",
+        disable=not shown,
+        delay=QUIET_SECONDS,
+        file=sys.stderr,
+    )
+    ends: list[Climb] = []
+    starts = np.asarray(charts)
+    complete = True
+    try:
+        for chart in charts:
+            left = _time_left(deadline)
+            ends.append(climb(result, int(chart), max_steps=max_steps, max_seconds=left))
+            bar.update()
+        if all_motions:
+            # Climbs in R that met go on as one.
+            tops = [_top(peak, ends) for peak in peaks_of(result, ends)]
+            bar.total = len(charts) + len(tops)
+            starts, ends = starts[tops], [ends[top] for top in tops]
+            for i, end in enumerate(ends):
+                left = _time_left(deadline)
+                ends[i] = climb(result, end.x, all_motions=True, max_steps=max_steps, max_seconds=left)
+                bar.update()
+    except KeyboardInterrupt:
+        complete = False
+        if not ends:
+            best = result.best
+            ends, starts = [Climb(best.chart, best.x, np.array([best.quality]), False)], np.array([best.chart])
+    finally:
+        with held():
+            bar.close()
+    peaks = peaks_of(result, ends)
+    tops = [_top(peak, ends) for peak in peaks]
+    return Refinement(
+        x=np.array([peak.x for peak in peaks]),
+        qualities=np.array([peak.quality for peak in peaks]),
+        starts=np.array([starts[top] for top in tops], np.int64),
+        converged=np.array([ends[top].converged for top in tops], bool),
+        unbounded=np.array([ends[top].unbounded for top in tops], bool),
+        steps=np.array([ends[top].n_steps for top in tops], np.int64),
+        all_motions=all_motions,
+        complete=complete,
+    )
+
+
+def _time_left(deadline: float) -> float | None:
+    """Time for a climb [s]; None for no limit.
+
+    Raises:
+        KeyboardInterrupt: If there is none left, or a signal has asked for the end: both end the climbs alike.
+    """
+    left = deadline - time.perf_counter()
+    if left <= 0.0 or stopping():
+        raise KeyboardInterrupt
+    return None if left == float("inf") else left
+
+
+def _top(peak: Peak, ends: Sequence[Climb]) -> int:
+    """Number of the climb that ended highest on a peak."""
+    return int(max(peak.climbs, key=lambda c: ends[int(c)].quality))

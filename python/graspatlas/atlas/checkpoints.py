@@ -1,0 +1,133 @@
+"""Checkpoints of an atlas in the making, from which it goes on to the same result, to the bit."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graspatlas import _core
+from graspatlas.errors import GraspAtlasError
+from graspatlas.support.archives import DamagedArchive, read_arrays
+from graspatlas.support.files import opened, replaced, stated_path
+from graspatlas.systems.system import AnySystem
+
+__all__ = ["CheckpointFolder", "run_digest"]
+
+#: Changes when a checkpoint of an older version would not lead to the same atlas.
+VERSION = 3
+#: Arrays of which each file of a checkpoint holds the part from its first chart on.
+_GROWING = ("centers", "bases", "residuals", "regularities", "keys")
+#: What each array of a checkpoint may hold: floating-point numbers, whole ones.
+_KINDS = {
+    **dict.fromkeys(("centers", "bases", "residuals", "regularities", "closed_vertices"), "f"),
+    **dict.fromkeys(("keys", "closed_charts", "closed_reasons", "generation", "again", "paused"), "iu"),
+    **dict.fromkeys(("counts", "first"), "iu"),
+}
+#: A step away from x0 at which the system is looked at, to tell it from others [units of the tangent space].
+_STEP = 1e-3
+
+
+def run_digest(system: AnySystem, x0: NDArray[np.float64], radius: float, epsilon: float) -> str:
+    """Digest that tells runs apart: the options, and the system's numbers at x0 and a step away from it."""
+    digest = hashlib.sha256(json.dumps([VERSION, type(system).__name__, radius, epsilon]).encode())
+    away = system.integrate(x0, np.full(system.tangent_size, _STEP))
+    for x in (x0, away):
+        for array in (x, system.evaluate_residual(x), system.evaluate_jacobian(x), system.slack(x)):
+            digest.update(np.ascontiguousarray(array, float).tobytes())
+    digest.update(np.ascontiguousarray(system.bound_normals).tobytes())
+    return digest.hexdigest()
+
+
+class CheckpointFolder:
+    """A folder of numbered files: each holds the charts from the first on whose number was not settled before.
+
+    So a long run writes nearly all charts once. A file is written beside its place and renamed, and what it says of the
+    state of the run replaces what older files say; a file that a killed run left unfinished is not there.
+
+    Args:
+        folder: The folder; made when the first file is written.
+        digest: Of the run, see :func:`run_digest`.
+    """
+
+    def __init__(self, folder: str | os.PathLike[str], digest: str) -> None:
+        self.folder = stated_path(folder, "keep a checkpoint at")
+        self.digest = digest
+        self._n_files = self._n_charts = 0
+
+    def load(self) -> dict[str, Any] | None:
+        """What ``AtlasBuilder.resume`` needs; None when there is no checkpoint.
+
+        Raises:
+            GraspAtlasError: If a file is damaged, or the checkpoint is of another run.
+        """
+        paths = sorted(self.folder.glob("*.npz"))
+        parts = [self._read(path) for path in paths]
+        if not parts:
+            return None
+        out = {name: part for name, part in parts[-1].items() if name != "first"}
+        try:
+            out |= {name: self._joined(name, parts) for name in _GROWING}
+        except ValueError:
+            raise GraspAtlasError(
+                f"the checkpoint is damaged: files of '{self.folder}' do not fit together; delete it to begin anew"
+            ) from None
+        self._n_files, self._n_charts = len(parts), int(parts[-1]["first"])
+        return out
+
+    def _joined(self, name: str, parts: list[dict[str, Any]]) -> NDArray[Any]:
+        """An array of all charts [flat]: each file says anew what older ones say from its first chart on."""
+        whole: NDArray[Any] = parts[0][name].reshape(len(parts[0]["keys"]), -1)
+        for part in parts[1:]:
+            added = part[name].reshape(len(part["keys"]), whole.shape[1]) if part["keys"].size else whole[:0]
+            whole = np.concatenate([whole[: int(part["first"])], added])
+        return whole.ravel()
+
+    def _read(self, path: Path) -> dict[str, Any]:
+        try:
+            with opened(path, "checkpoint") as stream:
+                part = read_arrays(stream)
+            digest = str(part.pop("digest"))
+        except OSError as error:
+            raise GraspAtlasError(f"cannot read checkpoint '{path}': {error.strerror or error}") from None
+        except (DamagedArchive, KeyError) as error:
+            raise GraspAtlasError(
+                f"'{path}' is damaged or no checkpoint ({error}); delete '{self.folder}' to begin anew"
+            ) from None
+        if digest != self.digest:
+            raise GraspAtlasError(
+                f"'{self.folder}' holds the checkpoint of another problem, of other options or of another version: "
+                "finish that run, delete the folder, or choose another one"
+            )
+        if set(part) != set(_KINDS) or any(array.dtype.kind not in _KINDS[name] for name, array in part.items()):
+            raise GraspAtlasError(f"'{path}' is damaged or no checkpoint; delete '{self.folder}' to begin anew")
+        return part
+
+    def write(self, builder: _core.AtlasBuilder) -> None:
+        """Write the charts that came since the last file, and the state of the run.
+
+        Raises:
+            GraspAtlasError: If the file cannot be written.
+        """
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise GraspAtlasError(f"cannot make folder '{self.folder}': {error.strerror or error}") from None
+        with replaced(self.folder / f"{self._n_files:06}.npz") as stream:
+            part: dict[str, Any] = dict(builder.save(self._n_charts))
+            np.savez(stream, digest=self.digest, first=self._n_charts, **part)
+        self._n_files += 1
+        self._n_charts = builder.n_settled
+
+    @staticmethod
+    def remove(folder: Path) -> None:
+        """Remove the files of a checkpoint, and the folder if nothing else is in it."""
+        for path in folder.glob("[0-9]*.npz"):
+            path.unlink()
+        if folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()

@@ -1,0 +1,200 @@
+"""The growth of an atlas: slices of work between looks at limits, at Ctrl-C and at the progress bar."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from graspatlas import _core
+from graspatlas.atlas.atlas import Status
+from graspatlas.atlas.checkpoints import CheckpointFolder
+from graspatlas.errors import GraspAtlasError
+from graspatlas.support.interrupts import hear, held, stopping
+from graspatlas.systems.system import AnySystem
+
+__all__ = ["Growth", "Limits", "available_bytes", "available_threads", "outlook"]
+
+_SLICE_SECONDS = 0.1
+#: Work that a killed run can lose [s], but for the time that writing takes.
+_CHECKPOINT_SECONDS = 20.0
+_QUIET_SECONDS = 1.0  # work that ends within this shows no progress bar
+#: A coarse atlas that tells the size of the one being grown has this part of its charts, about.
+_COARSE_SHARE = 1 / 30
+#: Share of the free memory that an atlas may take.
+_MEMORY_SHARE = 0.8
+
+
+#: Points of random walks that an audit looks up: at least, and as a share of the charts.
+AUDIT_POINTS, AUDIT_SHARE = 300, 1 / 20
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Where an atlas is cut short.
+
+    Attributes:
+        charts: Number of charts.
+        deadline: Time by ``time.perf_counter`` [s].
+        memory: Of the atlas with the arrays made of it [bytes].
+        seconds_each: Time that is to be left for each chart at the deadline, to read it [s].
+    """
+
+    charts: int
+    deadline: float
+    memory: float
+    seconds_each: float = 0.0
+
+
+class Growth:
+    """An atlas in the making.
+
+    Its final size is read off a coarse atlas of the same manifold, grown in the first seconds: the number of charts is
+    proportional to r^-k, but for the boundary and for bends sharper than the charts.
+    """
+
+    def __init__(
+        self,
+        builder: _core.AtlasBuilder,
+        system: AnySystem,
+        x0: NDArray[np.float64],
+        radius: float,
+        epsilon: float,
+    ) -> None:
+        self.builder = builder
+        self.audit_seconds = 0.0
+        self._ratio = float(_COARSE_SHARE ** (-1 / system.dimension))
+        self._coarse_arguments = (system, x0, self._ratio * radius, epsilon, builder.n_threads)
+        self._coarse: _core.AtlasBuilder | None = None
+        self._dimension = system.dimension
+
+    def run(self, limits: Limits, progress: bool | None, checkpoint: CheckpointFolder | None = None) -> Status:
+        """Grow the atlas until it is complete or meets a limit; a run that is long or cut short keeps a checkpoint."""
+        if checkpoint is None:
+            return self._run(limits, progress, lambda: None)
+        written = time.perf_counter()
+
+        def keep() -> None:
+            nonlocal written
+            if time.perf_counter() - written > _CHECKPOINT_SECONDS:
+                with held():
+                    checkpoint.write(self.builder)
+                written = time.perf_counter()
+                hear()
+
+        start = written
+        status = self._run(limits, progress, keep)
+        if status is not Status.COMPLETE or written > start:
+            with held():
+                checkpoint.write(self.builder)
+        return status
+
+    def _run(self, limits: Limits, progress: bool | None, after_slice: Callable[[], None]) -> Status:
+        shown = sys.stderr.isatty() if progress is None else progress
+        # In a file a line every ten seconds is enough.
+        interval = 0.1 if sys.stderr.isatty() else 10.0
+        bar = tqdm(
+            desc="atlas",
+            unit=" charts",
+            disable=not shown,
+            delay=_QUIET_SECONDS,
+            file=sys.stderr,
+            initial=self.builder.n_charts,
+            mininterval=interval,
+        )
+        builder, start = self.builder, time.perf_counter()
+        try:
+            while not builder.audited:
+                now = time.perf_counter()
+                left = limits.deadline - now - limits.seconds_each * builder.n_charts
+                if stopping():
+                    raise KeyboardInterrupt
+                if left <= 0.0:
+                    return Status.TIME_LIMIT
+                if builder.n_charts >= limits.charts:
+                    return Status.CHART_LIMIT
+                if builder.n_bytes + builder.n_array_bytes > limits.memory:
+                    return Status.MEMORY_LIMIT
+                seconds = min(_SLICE_SECONDS, left)
+                if builder.complete:
+                    began = time.perf_counter()
+                    builder.audit(max(AUDIT_POINTS, round(AUDIT_SHARE * builder.n_charts)), seconds)
+                    self.audit_seconds += time.perf_counter() - began
+                else:
+                    builder.expand(limits.charts, seconds)
+                if shown and now - start > _QUIET_SECONDS:
+                    size = self.expected_size(seconds)
+                    bar.set_postfix_str(outlook(builder, size, time.perf_counter() - start), refresh=False)
+                bar.update(builder.n_charts - bar.n)
+                after_slice()
+        except KeyboardInterrupt:
+            if shown:
+                print(f"interrupted: keeping {builder.n_charts} charts", file=sys.stderr)
+            return Status.INTERRUPTED
+        finally:
+            with held():
+                bar.close()
+        return Status.COMPLETE
+
+    def expected_size(self, seconds: float) -> int | None:
+        """Find out, in so many seconds, about how many charts there will be; None while that is not known."""
+        if self._coarse is None:
+            try:
+                self._coarse = _core.AtlasBuilder(*self._coarse_arguments)
+            except GraspAtlasError:  # the manifold is too small for charts as large as these
+                self._coarse = self.builder
+        if self._coarse is self.builder:
+            return None
+        if not self._coarse.complete:
+            self._coarse.expand(self.builder.n_charts, seconds)
+        if not self._coarse.complete:
+            return None
+        return round(float(self._coarse.n_charts * self._ratio**self._dimension))
+
+
+def outlook(builder: _core.AtlasBuilder, size: int | None, seconds: float) -> str:
+    """What the progress bar says besides the charts so far."""
+    text = f"{builder.n_open} open"
+    if size is None or size < builder.n_charts:
+        return text
+    left = seconds * (size - builder.n_charts) / builder.n_charts
+    return f"{text}; about {float(f'{size:.2g}'):,.0f} charts in all, {left:.0f} s left"
+
+
+def available_threads() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def available_bytes() -> float:
+    """Memory that an atlas may take: a share of what the machine, or the container, has free; inf if unknown."""
+    free = [size for size in (_free_in_machine(), _free_in_container()) if size is not None]
+    return _MEMORY_SHARE * min(free) if free else float("inf")
+
+
+def _free_in_machine() -> float | None:
+    try:
+        for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
+            if line.startswith("MemAvailable:"):
+                return 1024.0 * float(line.split()[1])
+    except OSError:
+        pass
+    return None
+
+
+def _free_in_container() -> float | None:
+    folder = Path("/sys/fs/cgroup")
+    try:
+        limit = float((folder / "memory.max").read_text(encoding="ascii"))  # "max" where there is none
+        return limit - float((folder / "memory.current").read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        return None

@@ -1,0 +1,80 @@
+"""The commands about problem files: graspatlas new, check and schema."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from graspatlas.commands.arguments import path_word
+from graspatlas.commands.diagnosis import PROBLEM, Finding, diagnose, report
+from graspatlas.errors import GraspAtlasError
+from graspatlas.problems import load_problem
+from graspatlas.support.files import replaced
+from graspatlas.support.terminal import say
+
+__all__ = ["add_problem_commands"]
+
+
+def add_problem_commands(commands: Any) -> None:
+    """Add new, check and schema to the subcommands of a parser."""
+    new = commands.add_parser("new", help="write a commented problem file for a hand, to be filled in")
+    new.add_argument(
+        "urdf",
+        help="URDF of the hand; or example_robot_data:NAME, or robot_descriptions:NAME",
+    )
+    new.add_argument("--object", metavar="FILE", help="URDF or mesh of the object")
+    new.add_argument("--output", type=path_word, metavar="FILE", help="file to write; standard output by default")
+    new.set_defaults(run=_new)
+
+    check = commands.add_parser("check", help="look at all that decides whether an atlas of a problem can be traced")
+    check.add_argument("problem", help="path of a problem file, or name of a bundled problem")
+    check.add_argument("--dimension", type=int, metavar="K", help="dimension k to look at")
+    check.add_argument("--radius", type=float, metavar="R", help="radius of a chart to look at")
+    check.add_argument("--json", action="store_true", help="print the findings as JSON")
+    check.set_defaults(run=_check)
+
+    schema = commands.add_parser("schema", help="write the JSON Schema of problem files, for editors")
+    schema.add_argument("--output", type=path_word, metavar="FILE", help="file to write; standard output by default")
+    schema.set_defaults(run=_schema)
+
+
+def _new(options: argparse.Namespace) -> int:
+    from graspatlas.problem_files.template import problem_template  # slow to import
+
+    folder = options.output.parent if options.output else Path()
+    text = problem_template(options.urdf, options.object, folder=folder)
+    _write(text, options.output, keep=True)
+    return 0
+
+
+def _check(options: argparse.Namespace) -> int:
+    from graspatlas.problem_files import ProblemFileError  # slow to import
+
+    try:
+        findings = diagnose(load_problem(options.problem), dimension=options.dimension, radius=options.radius)
+    except ProblemFileError as error:
+        hint = "every field is explained in docs/problem_files.md"
+        findings = [Finding(PROBLEM, "problem file", fault, hint) for fault in error.faults]
+    say(json.dumps([finding.to_dict() for finding in findings]) if options.json else report(findings))
+    return int(any(finding.mark == PROBLEM for finding in findings))
+
+
+def _schema(options: argparse.Namespace) -> int:
+    from graspatlas.problem_files import json_schema  # slow to import
+
+    _write(json.dumps(json_schema(), indent=2) + "\n", options.output, keep=False)
+    return 0
+
+
+def _write(text: str, path: Path | None, *, keep: bool) -> None:
+    """Write to a file, or to standard output; with `keep`, a file that exists is not overwritten."""
+    if path is None:
+        say(text, end="")
+        return
+    if keep and os.path.lexists(path):
+        raise GraspAtlasError(f"'{path}' exists; choose another name or remove it")
+    with replaced(path) as stream:
+        stream.write(text.encode("utf-8"))

@@ -1,0 +1,323 @@
+"""Grasps as quality indices, viewers and users see them: one, or a batch.
+
+A transform T_a_b is the pose of b in the frame of a: it maps coordinates in b to coordinates in a. The palm is the root
+link of the hand's URDF, the object that of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from graspatlas import _core
+from graspatlas.support.pickling import Light
+from graspatlas.support.validation import number_array, read_only
+
+if TYPE_CHECKING:
+    from graspatlas.problem.problem import Problem
+
+__all__ = ["Grasp", "Grasps"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Grasp:
+    """One grasp; m contacts, h joint velocities. Its arrays cannot be written to: copy what you want to change.
+
+    Attributes:
+        x: The grasp as a point of the manifold [configuration_size].
+        q: Joint configuration of the hand [nq], in the order of ``joints``.
+        joints: Names of the joints, in the order of q.
+        joint_positions: Position of each joint by name [rad or m]; of a continuous joint the angle in [-pi, pi].
+        T_palm_object: Pose of the object in the palm's frame [4, 4].
+        contact_points: Contact points in the palm's frame [m, 3], metres.
+        contact_normals: Outward unit normals of the object there [m, 3].
+        J: Joint velocities to velocities of the contact points [3 m, h]; of joints that mimic others the columns are
+            added to those of their drivers, ``problem.hand.mechanism.driven``.
+        G: Contact forces to the object's wrench at its origin, world axes [6, 3 m]; [3, 3 m] in the plane.
+        semi_axes: Ascending semi-axes of the manipulability ellipsoid [6], lengths in millimetres; [3] in the plane.
+        problem: The problem that it solves.
+        quality: Value of the index that was optimised; NaN when there is none.
+        chart: Index of the chart; -1 when there is none.
+    """
+
+    x: Array
+    q: Array
+    joints: tuple[str, ...]
+    joint_positions: Mapping[str, float]
+    T_palm_object: Array
+    contact_points: Array
+    contact_normals: Array
+    J: Array
+    G: Array
+    semi_axes: Array
+    problem: Problem
+    quality: float = float("nan")
+    chart: int = -1
+
+    def __repr__(self) -> str:
+        chart = f", chart {self.chart}" if self.chart >= 0 else ""
+        quality = "" if np.isnan(self.quality) else f", quality {self.quality:.6g}"
+        return f"<Grasp of {self.problem.name!r}{chart}{quality}>"
+
+    @property
+    def object_xyz(self) -> Array:
+        """Position of the object in the palm's frame [3], metres."""
+        return np.asarray(self.T_palm_object[:3, 3])
+
+    @property
+    def object_quat_xyzw(self) -> Array:
+        """Rotation of the object as a unit quaternion [4]."""
+        return np.asarray(Rotation.from_matrix(self.T_palm_object[:3, :3]).as_quat())
+
+    @property
+    def T_object_palm(self) -> Array:
+        """Pose of the palm in the object's frame [4, 4]: where a robot has to bring the hand."""
+        return _inverse(self.T_palm_object)
+
+    @property
+    def palm_xyz(self) -> Array:
+        """Position of the palm in the object's frame [3], metres."""
+        return np.asarray(self.T_object_palm[:3, 3])
+
+    @property
+    def palm_quat_xyzw(self) -> Array:
+        """Rotation of the palm in the object's frame as a unit quaternion [4]."""
+        return np.asarray(Rotation.from_matrix(self.T_object_palm[:3, :3]).as_quat())
+
+    @property
+    def object_pose(self) -> Any:
+        """Pose of the object in the palm's frame, as a ``pinocchio.SE3``; metres."""
+        return _se3(self.T_palm_object)
+
+    @property
+    def palm_pose(self) -> Any:
+        """Pose of the palm in the object's frame, as a ``pinocchio.SE3``; metres."""
+        return _se3(self.T_object_palm)
+
+    @property
+    def contact_frames(self) -> tuple[str, ...]:
+        """Link or frame of the hand that touches, for each contact [m]."""
+        return tuple(contact.frame for contact in self.problem.contacts)
+
+    @property
+    def contact_points_in_object(self) -> Array:
+        """Contact points in the object's frame [m, 3], metres."""
+        T = self.T_object_palm
+        return np.asarray(self.contact_points @ T[:3, :3].T + T[:3, 3])
+
+    @property
+    def contact_normals_in_object(self) -> Array:
+        """Outward unit normals of the object there, in the object's frame [m, 3]."""
+        return np.asarray(self.contact_normals @ self.T_object_palm[:3, :3].T)
+
+    def poses(self, frames: Sequence[str] | None = None) -> dict[str, Array]:
+        """Poses by name, ``"A_in_B"`` being that of A in B's frame.
+
+        Args:
+            frames: Links and frames of the hand; by default those that touch the object.
+
+        Returns:
+            Transforms [4, 4], lengths in metres: ``object_in_palm``, ``palm_in_object``, and ``<frame>_in_object`` for
+            each frame.
+
+        Raises:
+            GraspAtlasError: If the hand has no such frame.
+        """
+        return {name: T[0] for name, T in Grasps(self.problem, self.x).poses(frames).items()}
+
+    def __str__(self) -> str:
+        angles = ", ".join(f"{name} {value:.3f}" for name, value in self.joint_positions.items())
+        xyz = ", ".join(f"{value:.4f}" for value in self.object_xyz)
+        return f"quality {self.quality:.6g} at chart {self.chart}: object at ({xyz}) m; {angles}"
+
+
+class Grasps(Light):
+    """A batch of n grasps of one problem; everything is computed once, in the compiled core, when first asked for.
+
+    Its attributes are those of :class:`Grasp` with a leading axis of length n. Its arrays cannot be written to: they
+    are shared, ``x`` with what it was made of, often the centres of an atlas.
+
+    Args:
+        problem: The problem.
+        system: Its system; that of all feasible grasps by default.
+        X: One grasp a row [n, configuration_size].
+        charts: Chart of each [n]; -1 for none, as by default.
+    """
+
+    #: Unit of the lengths in the object's velocity for `semi_axes` [m].
+    LENGTH_UNIT = 1e-3
+
+    def __init__(
+        self,
+        problem: Problem,
+        X: ArrayLike,
+        system: _core.GraspSystem | None = None,
+        charts: ArrayLike | None = None,
+    ) -> None:
+        self.problem = problem
+        self.system = system if system is not None else problem.full_system
+        self.x = read_only(np.ascontiguousarray(np.atleast_2d(number_array(X, "X"))))
+        self.charts = read_only(np.full(len(self.x), -1) if charts is None else np.asarray(charts, np.int64))
+
+    def __repr__(self) -> str:
+        return f"<Grasps: {len(self)} of {self.problem.name!r}>"
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the hand's joints."""
+        return self.problem.hand.joints
+
+    @property
+    def q(self) -> Array:
+        """Joint configurations of the hand [n, nq]."""
+        return self.x[:, : self.problem.hand.model.hand_q_size]
+
+    @property
+    def joint_positions(self) -> dict[str, Array]:
+        """Position of each joint by name, [n] each [rad or m]; of a continuous joint the angle in [-pi, pi]."""
+        rows = [self.problem.hand.joint_positions(q) for q in self.q]
+        return {name: np.array([row[name] for row in rows], float) for name in self.joints}
+
+    @cached_property
+    def _arrays(self) -> dict[str, Array]:
+        return {name: read_only(array) for name, array in self.system.grasp_arrays(self.x).items()}
+
+    @property
+    def T_palm_object(self) -> Array:
+        """Poses of the object in the palm's frame [n, 4, 4]."""
+        return self._arrays["T_palm_object"]
+
+    @property
+    def object_xyz(self) -> Array:
+        """Positions of the object in the palm's frame [n, 3], metres."""
+        return self.T_palm_object[:, :3, 3]
+
+    @property
+    def object_quat_xyzw(self) -> Array:
+        """Rotations of the object as unit quaternions [n, 4]."""
+        return _quaternions(self.T_palm_object)
+
+    @property
+    def T_object_palm(self) -> Array:
+        """Poses of the palm in the object's frame [n, 4, 4]."""
+        return _inverse(self.T_palm_object)
+
+    @property
+    def palm_xyz(self) -> Array:
+        """Positions of the palm in the object's frame [n, 3], metres."""
+        return self.T_object_palm[:, :3, 3]
+
+    @property
+    def palm_quat_xyzw(self) -> Array:
+        """Rotations of the palm in the object's frame as unit quaternions [n, 4]."""
+        return _quaternions(self.T_object_palm)
+
+    def poses(self, frames: Sequence[str] | None = None) -> dict[str, Array]:
+        """Poses by name, [n, 4, 4] each; see :meth:`Grasp.poses`.
+
+        Raises:
+            GraspAtlasError: If the hand has no such frame.
+        """
+        T_object_palm = self.T_object_palm
+        named = {"object_in_palm": self.T_palm_object, "palm_in_object": T_object_palm}
+        wanted = dict.fromkeys(self.contact_frames if frames is None else frames)
+        for frame in wanted:
+            self.problem.hand.frame(frame)
+        places = [self.problem.hand.link_placements(q) for q in self.q]
+        for frame in wanted:
+            T_palm_frame = np.array([place[frame] for place in places]).reshape(-1, 4, 4)
+            named[f"{frame}_in_object"] = T_object_palm @ T_palm_frame
+        return named
+
+    @property
+    def contact_frames(self) -> tuple[str, ...]:
+        """Link or frame of the hand that touches, for each contact [m]."""
+        return tuple(contact.frame for contact in self.problem.contacts)
+
+    @property
+    def contact_points(self) -> Array:
+        """Contact points on the object, in the palm's frame [n, m, 3], metres."""
+        return self._arrays["object_points"]
+
+    @property
+    def contact_normals(self) -> Array:
+        """Outward unit normals of the object at the contacts [n, m, 3]."""
+        return self._arrays["object_normals"]
+
+    @property
+    def contact_points_in_object(self) -> Array:
+        """Contact points in the object's frame [n, m, 3], metres."""
+        T = self.T_object_palm
+        return np.asarray(self.contact_points @ T[:, :3, :3].swapaxes(1, 2) + T[:, None, :3, 3])
+
+    @property
+    def contact_normals_in_object(self) -> Array:
+        """Outward unit normals of the object there, in the object's frame [n, m, 3]."""
+        return np.asarray(self.contact_normals @ self.T_object_palm[:, :3, :3].swapaxes(1, 2))
+
+    @property
+    def J(self) -> Array:
+        """Joint velocities to velocities of the contact points [n, 3 m, h]."""
+        return self._arrays["J"]
+
+    @property
+    def G(self) -> Array:
+        """Contact forces to the object's wrench at its origin, world axes [n, 6, 3 m]."""
+        return self._arrays["G"]
+
+    @cached_property
+    def semi_axes(self) -> Array:
+        """Ascending semi-axes of the manipulability ellipsoid [n, 6], lengths in millimetres."""
+        return read_only(np.asarray(_core.semi_axes(self.system, self.x, self.LENGTH_UNIT)))
+
+    def __getitem__(self, i: int) -> Grasp:
+        one = Grasps(self.problem, self.x[i], self.system) if len(self) > 1 else self  # computed for this grasp alone
+        return Grasp(
+            x=one.x[0],
+            q=one.q[0],
+            joints=self.joints,
+            joint_positions=self.problem.hand.joint_positions(one.q[0]),
+            T_palm_object=one.T_palm_object[0],
+            contact_points=one.contact_points[0],
+            contact_normals=one.contact_normals[0],
+            J=one.J[0],
+            G=one.G[0],
+            semi_axes=one.semi_axes[0],
+            problem=self.problem,
+            chart=int(self.charts[i]),
+        )
+
+    def __iter__(self) -> Iterator[Grasp]:
+        return (self[i] for i in range(len(self)))
+
+
+def _inverse(T: Array) -> Array:
+    """Inverses of rigid transforms [..., 4, 4]."""
+    out = np.zeros_like(T)
+    out[..., :3, :3] = T[..., :3, :3].swapaxes(-1, -2)
+    out[..., :3, 3] = -np.einsum("...ji,...j->...i", T[..., :3, :3], T[..., :3, 3])
+    out[..., 3, 3] = 1.0
+    return out
+
+
+def _quaternions(T: Array) -> Array:
+    """Rotations of transforms [n, 4, 4] as unit quaternions x y z w [n, 4]."""
+    return np.asarray(Rotation.from_matrix(T[:, :3, :3]).as_quat()).reshape(-1, 4)
+
+
+def _se3(T: Array) -> Any:
+    """A transform [4, 4] as Pinocchio has it."""
+    import pinocchio as pin  # slow to import
+
+    return pin.SE3(T[:3, :3], T[:3, 3])

@@ -1,0 +1,94 @@
+"""Mesh files of a URDF, looked at before a collision library does: that one takes what is no number for a place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graspatlas.errors import GraspAtlasError
+from graspatlas.hand.robot_files import PACKAGE
+from graspatlas.hand.urdf_checks import LARGEST
+from graspatlas.support.files import is_file, read_text
+
+if TYPE_CHECKING:
+    from graspatlas.hand.hand import Body
+
+__all__ = ["check_meshes"]
+
+#: Before the triangles of a binary STL file: a header, and their number [bytes].
+_STL_HEADER = 84
+#: A triangle of a binary STL file.
+_STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
+
+def check_meshes(body: Body) -> None:
+    """Make sure that the STL and OBJ files which a body's URDF names hold places, and enough of them for a triangle.
+
+    Args:
+        body: The body; files that are not there are passed over, since whoever reads them says so.
+
+    Raises:
+        GraspAtlasError: If one holds a number that is not finite, or nothing but a point or a line.
+    """
+    for name in sorted({str(mesh.get("filename")) for mesh in ElementTree.fromstring(body.urdf).iter("mesh")}):
+        path = _path(name, body.package_dirs)
+        if path is not None:
+            _check(body.name, path)
+
+
+def _path(name: str, folders: tuple[str, ...]) -> Path | None:
+    """Where a mesh is found, as Pinocchio looks for it."""
+    if name.startswith(PACKAGE):
+        places = [Path(folder) / name[len(PACKAGE) :] for folder in folders]
+    else:
+        places = [Path(name.removeprefix("file://"))]
+    return next((place for place in places if is_file(place)), None)
+
+
+def _check(body: str, path: Path) -> None:
+    try:
+        corners = _corners(path)
+    except (OSError, ValueError) as error:
+        raise GraspAtlasError(f"mesh '{path}' of '{body}' cannot be read: {error}") from None
+    if corners is None:
+        return
+    sound = (np.abs(corners) < LARGEST).all(axis=1)
+    if not sound.all():
+        first = ", ".join(f"{number:g}" for number in corners[np.flatnonzero(~sound)[0]])
+        raise GraspAtlasError(
+            f"mesh '{path}' of '{body}' has {(~sound).sum()} corners that are no places, as ({first}): save it anew"
+        )
+    spread = corners - corners.mean(axis=0) if len(corners) else np.zeros((1, 3))
+    sizes = np.linalg.svd(spread.T @ spread, compute_uv=False) ** 0.5
+    if not sizes[1] > 1e-9 * sizes[0]:
+        raise GraspAtlasError(f"mesh '{path}' of '{body}' has no area: its corners lie in one point or line")
+
+
+def _corners(path: Path) -> NDArray[np.float64] | None:
+    """Corners of the triangles of a mesh [n, 3], in its own unit; None where the format is not known here."""
+    kind = path.suffix.lower()
+    if kind == ".stl":
+        return _stl_corners(path)
+    if kind != ".obj":
+        return None
+    rows = [line.split()[1:4] for line in read_text(path).splitlines() if line.startswith("v ")]
+    return np.array(rows, float).reshape(-1, 3)
+
+
+def _stl_corners(path: Path) -> NDArray[np.float64] | None:
+    """Corners in an STL file, binary or text; None where it is neither, which whoever reads it says."""
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        head = stream.read(_STL_HEADER)
+        count = int.from_bytes(head[80:84], "little")
+        if len(head) == _STL_HEADER and size == _STL_HEADER + count * _STL_TRIANGLE.itemsize:
+            return np.fromfile(stream, _STL_TRIANGLE, count)["corners"].reshape(-1, 3).astype(float)
+    if not head.lstrip().startswith(b"solid"):
+        return None
+    words = read_text(path, "latin-1").split()  # of the file, whose lines may be broken anywhere
+    rows = [words[i + 1 : i + 4] for i, word in enumerate(words) if word == "vertex"]
+    return np.array(rows, float).reshape(-1, 3)

@@ -1,0 +1,237 @@
+"""Edits and texts of URDF: joints locked at a position, and bodies of one primitive or one mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from xml.etree import ElementTree
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.hand.mechanism import Mimic, read_mimics
+
+__all__ = [
+    "box_urdf",
+    "cylinder_urdf",
+    "joint_limits",
+    "joints_of_kind",
+    "lock_joints",
+    "mesh_urdf",
+    "mimics",
+    "moving_joints",
+    "root_link",
+    "sphere_urdf",
+    "velocity_limits",
+    "with_followers_limited",
+]
+
+Array = NDArray[np.float64]
+#: Joints that move with one degree of freedom.
+TURNING, SLIDING = ("revolute", "continuous"), ("prismatic",)
+#: Two positions of a locked joint that differ by less are the same [rad or m].
+SAME = 1e-6
+
+
+def moving_joints(urdf: str) -> tuple[str, ...]:
+    """Names of the joints that are not fixed, in the order of the text.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    return tuple(str(joint.get("name")) for joint in _joints(ElementTree.fromstring(urdf)))
+
+
+def joints_of_kind(urdf: str, kind: str) -> set[str]:
+    """Names of the joints of a type, such as ``continuous``.
+
+    Args:
+        urdf: Text of a URDF.
+        kind: The type.
+    """
+    return {str(joint.get("name")) for joint in _joints(ElementTree.fromstring(urdf)) if joint.get("type") == kind}
+
+
+def joint_limits(urdf: str) -> dict[str, tuple[float, float]]:
+    """Limits (lower, upper) of the revolute joints of a URDF [rad], by name.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    limits = {}
+    for joint in _joints(ElementTree.fromstring(urdf)):
+        limit = joint.find("limit")
+        if joint.get("type") == "revolute" and limit is not None:
+            limits[str(joint.get("name"))] = (float(limit.get("lower", "0")), float(limit.get("upper", "0")))
+    return limits
+
+
+def velocity_limits(urdf: str) -> dict[str, float]:
+    """Velocity limits of the moving joints of a URDF that state a positive one [rad/s or m/s], by name.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    limits = {}
+    for joint in _joints(ElementTree.fromstring(urdf)):
+        limit = joint.find("limit")
+        velocity = 0.0 if limit is None else float(limit.get("velocity", "0"))
+        if velocity > 0.0:
+            limits[str(joint.get("name"))] = velocity
+    return limits
+
+
+def root_link(urdf: str) -> str:
+    """Name of the link of a URDF that is no joint's child; of the first where there are several.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    root = ElementTree.fromstring(urdf)
+    children = {str(child.get("link")) for joint in root.findall("joint") for child in joint.findall("child")}
+    return next((name for link in root.findall("link") if (name := str(link.get("name"))) not in children), "")
+
+
+def mimics(urdf: str) -> tuple[Mimic, ...]:
+    """The joints that mimic others; see :func:`graspatlas.hand.mechanism.read_mimics`.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    return read_mimics(ElementTree.fromstring(urdf)) if "<mimic" in urdf else ()
+
+
+def with_followers_limited(urdf: str) -> str:
+    """The URDF with the continuous joints made revolute that mimic joints with limits: they never go round.
+
+    Their limits are written as 0 and mean nothing.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    plain = {mimic.joint for mimic in mimics(urdf) if not mimic.turns}
+    root = ElementTree.fromstring(urdf)
+    changed = [joint for joint in _joints(root) if joint.get("name") in plain and joint.get("type") == "continuous"]
+    for joint in changed:
+        joint.set("type", "revolute")
+        for limit in joint.findall("limit"):
+            joint.remove(limit)
+        ElementTree.SubElement(joint, "limit", {"lower": "0", "upper": "0", "effort": "0", "velocity": "0"})
+    return ElementTree.tostring(root, encoding="unicode") if changed else urdf
+
+
+def lock_joints(urdf: str, positions: Mapping[str, float]) -> str:
+    """The URDF with some joints fixed where they stand at given positions, and with them those that mimic them.
+
+    Args:
+        urdf: Text of a URDF.
+        positions: Positions of the joints to lock, by name [rad or m].
+
+    Raises:
+        GraspAtlasError: If there is no such joint that moves, a position lies outside its limits, or a joint mimics
+            another that is not locked or has it elsewhere.
+    """
+    root = ElementTree.fromstring(urdf)
+    joints = {str(joint.get("name")): joint for joint in _joints(root)}
+    for name in positions:
+        if name not in joints:
+            raise unknown_name("joint", name, joints, "one that moves")
+    for name, position in _with_followers(positions, mimics(urdf)).items():
+        _lock(joints[name], float(position))
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _with_followers(positions: Mapping[str, float], followers: Iterable[Mimic]) -> dict[str, float]:
+    """Positions of joints to lock, those that mimic them included."""
+    full = dict(positions)
+    for mimic in followers:
+        if mimic.driver not in positions:
+            if mimic.joint in positions:
+                raise GraspAtlasError(
+                    f"joint '{mimic.joint}' mimics '{mimic.driver}' and stands still only with it: lock "
+                    f"'{mimic.driver}' instead"
+                )
+            continue
+        must = mimic.position(float(positions[mimic.driver]))
+        if not abs(float(positions.get(mimic.joint, must)) - must) <= SAME:
+            raise GraspAtlasError(
+                f"joint '{mimic.joint}' is locked at {float(positions[mimic.joint]):g}, but it mimics: {mimic} = "
+                f"{must:g}; lock '{mimic.driver}' alone"
+            )
+        full[mimic.joint] = must
+    return full
+
+
+def _joints(root: ElementTree.Element) -> Iterable[ElementTree.Element]:
+    return [joint for joint in root.findall("joint") if joint.get("type") != "fixed"]
+
+
+def _lock(joint: ElementTree.Element, position: float) -> None:
+    """Makes a joint fixed; its origin takes up the motion."""
+    name, kind = joint.get("name"), joint.get("type")
+    if kind not in TURNING + SLIDING:
+        raise GraspAtlasError(f"joint '{name}' is {kind} and cannot be locked at one number")
+    limit = joint.find("limit")
+    if limit is not None and kind != "continuous":
+        lower, upper = float(limit.get("lower", "0")), float(limit.get("upper", "0"))
+        if not lower <= position <= upper:
+            limits = f"[{lower:g}, {upper:g}]"
+            raise GraspAtlasError(f"joint '{name}' is locked at {position:g}, outside its limits {limits}")
+    origin = joint.find("origin")
+    if origin is None:
+        origin = ElementTree.SubElement(joint, "origin")
+    xyz, rpy = _triple(origin.get("xyz"), (0, 0, 0)), _triple(origin.get("rpy"), (0, 0, 0))
+    element = joint.find("axis")
+    axis = _triple(None if element is None else element.get("xyz"), (1, 0, 0))
+    axis = axis / max(float(np.linalg.norm(axis)), np.finfo(float).tiny)
+    rotation = Rotation.from_euler("xyz", rpy)
+    if kind in TURNING:
+        turned = rotation * Rotation.from_rotvec(position * axis)
+        rpy = turned.as_euler("xyz", suppress_warnings=True)
+    else:
+        xyz = xyz + rotation.apply(position * axis)
+    origin.set("xyz", _words(xyz))
+    origin.set("rpy", _words(rpy))
+    joint.set("type", "fixed")
+    for tag in ("axis", "limit", "mimic", "dynamics", "safety_controller", "calibration"):
+        for child in joint.findall(tag):
+            joint.remove(child)
+
+
+def _triple(text: str | None, default: Sequence[float]) -> Array:
+    return np.array(default if text is None else [float(word) for word in text.split()], float)
+
+
+def _words(values: Iterable[float]) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def sphere_urdf(name: str, radius: float) -> str:
+    """URDF of a sphere about the origin; `radius` in metres."""
+    return _one_link(name, f'<sphere radius="{radius!r}"/>')
+
+
+def box_urdf(name: str, size: Iterable[float]) -> str:
+    """URDF of a box about the origin; `size` [3] are its edges along x, y and z [m]."""
+    return _one_link(name, f'<box size="{_words(size)}"/>')
+
+
+def cylinder_urdf(name: str, radius: float, length: float) -> str:
+    """URDF of a cylinder about the origin, its axis along z; `radius` and `length` in metres."""
+    return _one_link(name, f'<cylinder radius="{radius!r}" length="{length!r}"/>')
+
+
+def mesh_urdf(name: str, filename: str, scale: Iterable[float]) -> str:
+    """URDF of a mesh; `filename` as URDFs name them, `scale` [3] from the mesh's unit to metres."""
+    return _one_link(name, f'<mesh filename={quoteattr(filename)} scale="{_words(scale)}"/>')
+
+
+def _one_link(name: str, shape: str) -> str:
+    """One link, seen and touched as one shape."""
+    geometry = f"<geometry>{shape}</geometry>"
+    return (
+        f'<robot name={quoteattr(name)}><link name={quoteattr(name)}><visual>{geometry}<material name="grey">'
+        f'<color rgba="0.72 0.74 0.78 1"/></material></visual><collision>{geometry}</collision></link></robot>'
+    )

@@ -1,0 +1,292 @@
+"""The search for the shortest path between two grasps that never lets go.
+
+Charts that neighbour each other make a graph; its shortest path is bridged on the manifold and pulled tight there
+(:mod:`graspatlas.systems.geodesic`), since a path from centre to centre zigzags.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from itertools import pairwise
+from numbers import Integral, Real
+from typing import overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from graspatlas.atlas.atlas import Atlas
+from graspatlas.errors import GraspAtlasError
+from graspatlas.grasps.grasps import Grasp
+from graspatlas.paths.path import GraspPath, Path
+from graspatlas.result.result import Result
+from graspatlas.support.interrupts import stoppable
+from graspatlas.support.validation import number_array
+from graspatlas.systems.geodesic import BOUND_TOLERANCE, Allowed, arc_lengths, bridge, evenly, shorten
+
+__all__ = ["shortest_path"]
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+#: A chart's number, a grasp, or a point of the manifold.
+End = int | Grasp | ArrayLike
+
+#: Longest step of a path, as a share of the chart radius.
+STEP = 0.1
+#: Steps are this much shorter while a path is pulled tight, for they may grow then.
+SPARE = 1.5
+#: Largest entry of |R(x)| of a point of a path.
+RESIDUAL_TOLERANCE = 1e-9
+#: A grasp belongs to a chart when it is no farther from its polytope than this share of the radius.
+NEAR = 0.5
+#: Points no farther apart than this are the same [units of the tangent space].
+SAME = 1e-9
+
+
+@overload
+def shortest_path(
+    on: Result,
+    start: End = 0,
+    end: End | None = None,
+    *,
+    feasible: bool = False,
+    step: float | None = None,
+    progress: bool | None = None,
+) -> GraspPath: ...
+
+
+@overload
+def shortest_path(
+    on: Atlas,
+    start: End = 0,
+    end: End | None = None,
+    *,
+    feasible: bool = False,
+    step: float | None = None,
+    progress: bool | None = None,
+) -> Path: ...
+
+
+@stoppable()
+def shortest_path(
+    on: Result | Atlas,
+    start: End = 0,
+    end: End | None = None,
+    *,
+    feasible: bool = False,
+    step: float | None = None,
+    progress: bool | None = None,
+) -> Path:
+    """The shortest path between two points of an atlas, all of it on the manifold and inside its bounds.
+
+    Dijkstra's algorithm finds the way through the charts; the path is then pulled tight on the manifold. It is a
+    geodesic, or hugs bounds and what is not feasible: the shortest of all that can be reached from the way through the
+    charts without lifting over a hole. Ctrl-C keeps the path as it is then.
+
+    Args:
+        on: A result; or an atlas, of any system.
+        start: A chart's number, a grasp, or a point of the manifold [configuration_size]; the first grasp by default.
+        end: Likewise; the best grasp by default.
+        feasible: Whether every point must meet the result's requirements. They are asked at the points of the path, not
+            between them.
+        step: Longest distance between neighbouring points [units of the tangent space]; a tenth of the chart radius by
+            default.
+        progress: Show a progress bar on standard error; by default when it is a terminal.
+
+    Returns:
+        The path; a :class:`GraspPath` for a result. It has one point where start and end are the same.
+
+    Raises:
+        GraspAtlasError: If start or end is no chart, not on the manifold, not in the atlas or not feasible, or no path
+            leads from one to the other.
+    """
+    result = on if isinstance(on, Result) else None
+    if not isinstance(on, Result | Atlas):
+        raise GraspAtlasError(f"a path needs a graspatlas.Result or an Atlas, got {type(on).__name__}")
+    atlas = on.atlas if isinstance(on, Result) else on
+    longest = _step(atlas, step)
+    if result is None and feasible:
+        raise GraspAtlasError("an atlas has no requirements; give the result, or leave out feasible=True")
+    if result is None and end is None:
+        raise GraspAtlasError("an atlas has no best grasp; give end")
+    ends = [_End.of(atlas, result, "start", start)]
+    ends.append(_End.of(atlas, result, "end", result.best.chart if result and end is None else end))
+    open_charts, allowed = np.ones(atlas.n_charts, bool), None
+    if result and feasible and result.requirements:
+        open_charts, allowed = result.feasible, result.meets
+        for e in ends:
+            e.must_meet(result)
+    if float(np.linalg.norm(atlas.system.difference(ends[0].x, ends[1].x))) <= SAME:
+        X, tight = ends[0].x[None], True
+    else:
+        shown = sys.stderr.isatty() if progress is None else progress
+        X = _Roads(atlas, open_charts, ends, longest / SPARE, allowed).travel()
+        X, tight = _tightened(atlas, X, longest, allowed, shown)
+    residuals = np.array([np.abs(atlas.system.evaluate_residual(x)).max(initial=0.0) for x in X])
+    arguments = (atlas, X, arc_lengths(atlas.system, X), residuals, tight)
+    return GraspPath(*arguments, result) if result else Path(*arguments)
+
+
+def _step(atlas: Atlas, step: float | None) -> float:
+    if step is None:
+        return STEP * atlas.radius
+    if isinstance(step, bool) or not isinstance(step, Real) or not 0.0 < float(step) <= atlas.radius:
+        raise GraspAtlasError(f"step must be positive and at most the chart radius, {atlas.radius:g}; got {step!r}")
+    return float(step)
+
+
+def _tightened(atlas: Atlas, X: Array, step: float, allowed: Allowed | None, shown: bool) -> tuple[Array, bool]:
+    """The chain X pulled tight, with even steps if all its points are then allowed, and whether it is tight."""
+
+    def even(chain: Array, length: float) -> Array:
+        spread = evenly(atlas.system, chain, length)
+        return spread if spread is not None and (allowed is None or allowed(spread).all()) else chain
+
+    X = even(X, step / SPARE)
+    X, tight = shorten(atlas.system, X, reach=atlas.radius, longest=step, allowed=allowed, progress=shown)
+    return even(X, step), tight
+
+
+@dataclass(frozen=True, eq=False)
+class _End:
+    """Where a path begins or ends: a point of the manifold, a chart near it, and whether that is its centre."""
+
+    name: str
+    x: Array
+    chart: int
+    at_centre: bool
+
+    @classmethod
+    def of(cls, atlas: Atlas, result: Result | None, name: str, value: object) -> _End:
+        """The end that the caller named."""
+        if isinstance(value, Integral) and not isinstance(value, bool):
+            chart = int(value)
+            if not 0 <= chart < atlas.n_charts:
+                raise GraspAtlasError(f"{name} {chart} is no chart; the atlas has charts 0 to {atlas.n_charts - 1}")
+            return cls(name, atlas.centers[chart], chart, True)
+        x = number_array(value.x if isinstance(value, Grasp) else value, name)  # type: ignore[arg-type]
+        size = atlas.system.configuration_size
+        if x.shape != (size,):
+            raise GraspAtlasError(
+                f"{name} must be a chart's number, a grasp, or {size} numbers; got an array of shape {x.shape}"
+            )
+        _check_on_manifold(atlas, result, name, x)
+        chart, distance = atlas.locate(x)
+        if chart < 0 or distance > NEAR * atlas.radius:
+            raise GraspAtlasError(f"no chart of the atlas covers {name}; give a point connected to its first one")
+        near = float(np.linalg.norm(atlas.system.difference(atlas.centers[chart], x))) <= SAME
+        return cls(name, x, chart, near)
+
+    def must_meet(self, result: Result) -> None:
+        """Make sure that the grasp meets the requirements."""
+        if self.at_centre and result.feasible[self.chart]:
+            return
+        if self.at_centre or not result.meets(self.x[None])[0]:
+            where = f"chart {self.chart}" if self.at_centre else f"in chart {self.chart}"
+            raise GraspAtlasError(
+                f"{self.name} ({where}) does not meet the requirements, which {result.feasible.sum()} charts do: see "
+                "result.feasible, or leave out feasible=True"
+            )
+
+
+def _check_on_manifold(atlas: Atlas, result: Result | None, name: str, x: Array) -> None:
+    if not np.isfinite(x).all():
+        raise GraspAtlasError(f"{name} holds a number that is not finite")
+    residual = np.abs(atlas.system.evaluate_residual(x)).max(initial=0.0)
+    if result is not None:
+        residual = max(residual, np.abs(result.problem.frozen_residual(x, result.dimension)).max(initial=0.0))
+    if residual > RESIDUAL_TOLERANCE:
+        raise GraspAtlasError(
+            f"{name} is not on the manifold: its largest residual is {residual:.1e}, at most {RESIDUAL_TOLERANCE:g} is "
+            "allowed; give a chart's number or a grasp of this atlas"
+        )
+    slack = float(atlas.system.slack(x).min(initial=0.0))
+    if slack < -BOUND_TOLERANCE:
+        raise GraspAtlasError(f"{name} is {-slack:.1e} outside its bounds [units of the tangent space]")
+
+
+class _Roads:
+    """Charts that may be passed as a graph, with the two ends of the path.
+
+    Nodes are charts by their numbers, and ends that are no chart's centre after them.
+    """
+
+    def __init__(
+        self, atlas: Atlas, open_charts: Flags, ends: list[_End], step: float, allowed: Allowed | None
+    ) -> None:
+        self.atlas, self.ends, self.step, self.allowed = atlas, ends, step, allowed
+        pairs = [atlas.neighbour_pairs.astype(np.int64)]
+        self.points = [*atlas.centers]
+        self.nodes = []
+        for end in ends:
+            self.nodes.append(end.chart if end.at_centre else len(self.points))
+            if not end.at_centre:
+                beside = np.append(atlas.neighbours[end.chart], end.chart)
+                pairs.append(np.column_stack([beside, np.full(len(beside), len(self.points))]))
+                self.points.append(end.x)
+        self.open = np.append(open_charts, np.ones(len(self.points) - atlas.n_charts, bool))
+        roads = np.concatenate(pairs)
+        self.pairs = roads[self.open[roads].all(axis=1)]
+        difference = atlas.system.difference
+        self.lengths = np.array([np.linalg.norm(difference(self.points[i], self.points[j])) for i, j in self.pairs])
+        self.chains: dict[tuple[int, int], Array] = {}
+        self.n_closed = 0
+
+    def travel(self) -> Array:
+        """The shortest chain of points from end to end [n, configuration_size].
+
+        Neighbours between which no chain leads, or none that is allowed, are parted, and the way is sought again.
+        """
+        while True:
+            route = self._route()
+            legs = [(min(pair), max(pair)) for pair in pairwise(route)]
+            closed = self._explore([leg for leg in legs if leg not in self.chains])
+            if not closed:
+                break
+            self.n_closed += len(closed)
+            keep = [(int(min(pair)), int(max(pair))) not in closed for pair in self.pairs]
+            self.pairs, self.lengths = self.pairs[keep], self.lengths[keep]
+        pieces = [self.chains[a, b] if a < b else self.chains[b, a][::-1] for a, b in pairwise(route)]
+        return np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
+
+    def _explore(self, legs: list[tuple[int, int]]) -> set[tuple[int, int]]:
+        """Bridge legs; those that cannot be are returned."""
+        found = {(a, b): bridge(self.atlas.system, self.points[a], self.points[b], self.step) for a, b in legs}
+        closed = {leg for leg, chain in found.items() if chain is None}
+        chains = {leg: chain for leg, chain in found.items() if chain is not None}
+        if self.allowed is not None and chains:
+            free = self.allowed(np.concatenate([*chains.values()]))
+            starts = np.cumsum([0, *(len(chain) for chain in chains.values())])
+            closed |= {leg for leg, a, b in zip(chains, starts[:-1], starts[1:], strict=True) if not free[a:b].all()}
+        self.chains |= {leg: chain for leg, chain in chains.items() if leg not in closed}
+        return closed
+
+    def _route(self) -> list[int]:
+        """Nodes of the shortest way through the graph."""
+        start, end = self.nodes
+        graph = self._graph()
+        distances, before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
+        if not np.isfinite(distances[end]):
+            raise self._not_connected(graph)
+        route = [end]
+        while route[-1] != start:
+            route.append(int(before[route[-1]]))
+        return route[::-1]
+
+    def _graph(self) -> csr_array:
+        n = len(self.points)
+        return coo_array((self.lengths, (self.pairs[:, 0], self.pairs[:, 1])), shape=(n, n)).tocsr()
+
+    def _not_connected(self, graph: csr_array) -> GraspAtlasError:
+        group = connected_components(graph, directed=False)[1]
+        sizes = [int((group[self.open] == group[node]).sum()) for node in self.nodes]
+        pieces = len(np.unique(group[self.open]))
+        kind = "charts that meet the requirements" if self.allowed is not None else "charts"
+        parted = f" ({self.n_closed} pairs of neighbours parted by grasps between them)" if self.n_closed else ""
+        return GraspAtlasError(
+            f"start and end are not connected: the {self.open[: self.atlas.n_charts].sum()} {kind} form {pieces} "
+            f"pieces{parted}, start lies in one of {sizes[0]} charts, end in one of {sizes[1]}; choose an end in "
+            "start's piece" + (", or leave out feasible=True" if self.allowed is not None else "")
+        )

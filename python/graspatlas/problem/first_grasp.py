@@ -1,0 +1,216 @@
+"""A first grasp by joint names and a pose, and as the vector x (Section II of the paper)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.hand.hand import Hand
+from graspatlas.patches import Patch
+from graspatlas.problem.contact_parameters import touching_parameters
+from graspatlas.problem.contacts import Contact
+from graspatlas.support.validation import checked_table, number, number_array, numbers, shown
+
+__all__ = ["FirstGrasp", "first_grasp_from_array", "first_grasp_to_array", "posture_array", "unit_quaternion"]
+
+Array = NDArray[np.float64]
+
+#: Numbers of a first grasp are smaller [rad or m]: larger ones are mistakes, and their squares may overflow.
+LARGEST = 1e9
+
+
+@dataclass(frozen=True)
+class FirstGrasp:
+    """A feasible grasp x1 from which the atlas grows.
+
+    Attributes:
+        joints: Joint positions by name [rad or m]; all of the hand's.
+        object_xyz: Position of the object in the palm's frame [m].
+        object_quat_xyzw: Its rotation; normalised.
+        parameters: Free patch parameters in the order of x; found from the contact points when not given.
+    """
+
+    joints: Mapping[str, float]
+    object_xyz: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    object_quat_xyzw: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+    parameters: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        checked_table(self.joints, "x1's joints", (), None)
+        joints = [number(value, f"joint '{name}' of x1") for name, value in self.joints.items()]
+        xyz = number_array(self.object_xyz, "object_xyz")
+        quaternion = number_array(self.object_quat_xyzw, "object_quat_xyzw")
+        parameters = number_array(() if self.parameters is None else self.parameters, "the parameters of x1")
+        if xyz.shape != (3,) or quaternion.shape != (4,) or parameters.ndim != 1:
+            raise GraspAtlasError("x1 needs object_xyz of 3 numbers, object_quat_xyzw of 4 and a row of parameters")
+        values = np.concatenate([joints, xyz, quaternion, parameters])
+        if not (np.abs(values) < LARGEST).all():
+            raise GraspAtlasError(f"x1 holds a number that is not finite, or not below {LARGEST:g}")
+        object.__setattr__(self, "object_quat_xyzw", unit_quaternion(self.object_quat_xyzw, "x1"))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The first grasp as plain data."""
+        return {
+            "joints": dict(self.joints),
+            "object_xyz": list(self.object_xyz),
+            "object_quat_xyzw": list(self.object_quat_xyzw),
+            "parameters": None if self.parameters is None else list(self.parameters),
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> FirstGrasp:
+        """The first grasp that :meth:`to_dict` described.
+
+        Raises:
+            GraspAtlasError: If something is missing or wrong.
+        """
+        table = checked_table(data, "x1", ("joints", "object_xyz", "object_quat_xyzw"), ("parameters",))
+        joints = checked_table(table["joints"], "x1's joints", (), None)
+        parameters = table.get("parameters")
+        return cls(
+            joints={name: number(value, f"joint '{name}' of x1") for name, value in joints.items()},
+            object_xyz=numbers(table["object_xyz"], "object_xyz"),  # type: ignore[arg-type]
+            object_quat_xyzw=numbers(table["object_quat_xyzw"], "object_quat_xyzw"),  # type: ignore[arg-type]
+            parameters=None if parameters is None else numbers(parameters, "parameters"),
+        )
+
+
+def unit_quaternion(quaternion: Sequence[float], what: str) -> tuple[float, float, float, float]:
+    """A quaternion (x, y, z, w) of length one.
+
+    Args:
+        quaternion: Of any other length.
+        what: What has it, for messages.
+
+    Raises:
+        GraspAtlasError: If it is no four finite numbers, or zero.
+    """
+    array = number_array(quaternion, f"the quaternion of {what}")
+    if array.shape != (4,) or not (np.abs(array) < LARGEST).all():
+        raise GraspAtlasError(f"{what} needs a quaternion of 4 finite numbers, got {shown(quaternion)}")
+    norm = float(np.linalg.norm(array))
+    if norm < 1e-6:
+        raise GraspAtlasError(f"{what} has a quaternion of length zero")
+    # One that is unit to rounding stays as it came, so that a stored problem is the same problem.
+    norm = 1.0 if abs(norm - 1.0) < 1e-12 else norm
+    x, y, z, w = (float(c) / norm for c in quaternion)
+    return (x, y, z, w)
+
+
+def posture_array(hand: Hand, joints: Mapping[str, float], what: str) -> Array:
+    """Joint configuration [nq] of joint positions by name [rad or m].
+
+    Args:
+        hand: The hand.
+        joints: Position of each of its joints.
+        what: What gives them, for messages.
+
+    Raises:
+        GraspAtlasError: If a joint is missing, or is none of the hand's.
+    """
+    for name in joints:
+        if name not in hand.joints:
+            raise unknown_name("joint", name, hand.joints, f"in hand '{hand.name}'")
+    missing = [name for name in hand.joints if name not in joints]
+    if missing:
+        raise GraspAtlasError(f"{what} gives no position for joint '{missing[0]}' of hand '{hand.name}'")
+    q = np.array(hand.model.neutral, float)
+    for joint in hand.model.hand_joints:
+        value = joints[joint.name]
+        if joint.q_size == 2:
+            q[joint.q_index : joint.q_index + 2] = np.cos(value), np.sin(value)
+        else:
+            q[joint.q_index] = value
+    return q
+
+
+def first_grasp_to_array(
+    x1: FirstGrasp, hand: Hand, contacts: Sequence[Contact], object_joint: str, length_scale: float
+) -> Array:
+    """x1 as the vector [q_hand, q_object, free patch parameters], in Pinocchio's conventions.
+
+    Parameters that x1 does not give are those of the patch points nearest to each other.
+
+    Raises:
+        GraspAtlasError: If joints or patch parameters are missing or too many.
+    """
+    q = posture_array(hand, x1.joints, "x1")
+    pose: list[float] = [*x1.object_xyz, *x1.object_quat_xyzw]
+    if object_joint == "planar":
+        _, _, z, w = x1.object_quat_xyzw
+        pose = [*x1.object_xyz[:2], w * w - z * z, 2.0 * w * z]
+    free = sum(len(contact.free()) for contact in contacts)
+    if x1.parameters is not None and len(x1.parameters) != free:
+        how = "more" if len(x1.parameters) > free else "fewer"
+        raise GraspAtlasError(f"x1 gives {len(x1.parameters)} patch parameters, {how} than the {free} that are free")
+    parameters = (
+        x1.parameters if x1.parameters is not None else [*_nearest_parameters(x1, hand, q, contacts, length_scale)]
+    )
+    return np.array([*q, *pose, *parameters])
+
+
+def _nearest_parameters(
+    x1: FirstGrasp, hand: Hand, q: Array, contacts: Sequence[Contact], length_scale: float
+) -> Iterator[float]:
+    """Free patch parameters at which hand and object touch, or nearly so."""
+    places, T_object = hand.link_placements(q), _pose(x1)
+    for contact in contacts:
+        T_frame = places[contact.frame]
+        if set(contact.hand_frozen) == set(contact.hand.parameters):
+            on_hand = _at(contact.hand, contact.hand_frozen, np.zeros(3))
+            touch = _apply(T_frame, contact.hand.point(*on_hand))
+            on_object = _at(contact.object, contact.frozen, _apply(_inverse(T_object), touch))
+        else:
+            on_hand, on_object = touching_parameters(contact, _inverse(T_frame) @ T_object, length_scale)
+        for patch, frozen, values in (
+            (contact.hand, contact.hand_frozen, on_hand),
+            (contact.object, contact.frozen, on_object),
+        ):
+            yield from (values["uv".index(name)] for name in patch.parameters if name not in frozen)
+
+
+def _at(patch: Patch, frozen: Mapping[str, float], point: Array) -> tuple[float, float]:
+    """(u, v) of a patch nearest to a point, but for what is frozen."""
+    u, v = patch.locate(point)
+    return (float(frozen.get("u", u)), float(frozen.get("v", v)))
+
+
+def _pose(x1: FirstGrasp) -> Array:
+    """T_palm_object [4, 4]."""
+    T = np.eye(4)
+    x, y, z, w = x1.object_quat_xyzw
+    v = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    T[:3, :3] = np.eye(3) + 2.0 * w * v + 2.0 * v @ v
+    T[:3, 3] = x1.object_xyz
+    return T
+
+
+def _apply(T: Array, point: ArrayLike) -> Array:
+    return np.asarray(T[:3, :3] @ np.asarray(point) + T[:3, 3])
+
+
+def _inverse(T: Array) -> Array:
+    inverse = np.eye(4)
+    inverse[:3, :3] = T[:3, :3].T
+    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    return inverse
+
+
+def first_grasp_from_array(x: Array, hand: Hand, object_joint: str) -> FirstGrasp:
+    """The inverse of :func:`first_grasp_to_array`."""
+    nq = hand.model.hand_q_size
+    xyz, quaternion, rest = [*x[nq : nq + 3]], [*x[nq + 3 : nq + 7]], x[nq + 7 :]
+    if object_joint == "planar":
+        half = 0.5 * np.arctan2(x[nq + 3], x[nq + 2])
+        xyz, quaternion, rest = [*x[nq : nq + 2], 0.0], [0.0, 0.0, np.sin(half), np.cos(half)], x[nq + 4 :]
+    return FirstGrasp(
+        joints=hand.joint_positions(x[:nq]),
+        object_xyz=tuple(map(float, xyz)),  # type: ignore[arg-type]
+        object_quat_xyzw=tuple(map(float, quaternion)),  # type: ignore[arg-type]
+        parameters=tuple(map(float, rest)),
+    )

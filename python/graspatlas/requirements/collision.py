@@ -1,0 +1,258 @@
+"""Collisions of hand and object, by coal in the compiled core."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from tqdm import tqdm
+
+from graspatlas import _core
+from graspatlas.errors import GraspAtlasError
+from graspatlas.hand.mesh_files import check_meshes
+from graspatlas.requirements.collision_shapes import Shape, convex_hull, convex_solid, read_shapes, thinner
+
+if TYPE_CHECKING:
+    from graspatlas.hand.hand import Body
+    from graspatlas.problem.problem import Problem
+
+__all__ = ["CollisionChecker", "Nearest"]
+
+Array = NDArray[np.float64]
+
+#: Before the names of the object's shapes.
+OBJECT = "object/"
+#: Grasps are checked in batches of this size, on all cores.
+BATCH = 2048
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """Where pairs of shapes are nearest, or deepest in each other, for n grasps and p pairs.
+
+    A change of x that moves the first shape's point by da and the second's by db changes the distance by
+    normal . (db - da), where the points are unique. Where two meshes cut each other points and normals are NaN.
+
+    Attributes:
+        pairs: Names of the shapes [p].
+        distances: Signed distances [n, p], metres: negative is the depth of a collision; meshes that are no solids have
+            none.
+        on_first: The point on the first shape, in the palm's frame [n, p, 3], metres.
+        on_second: The point on the second shape [n, p, 3], metres.
+        normals: Unit vectors along which the second shape gets away from the first [n, p, 3], in the palm's frame.
+    """
+
+    pairs: tuple[tuple[str, str], ...]
+    distances: Array
+    on_first: Array
+    on_second: Array
+    normals: Array
+
+
+class CollisionChecker:
+    """Tells whether a grasp is free of collision: hand with itself, and hand with object.
+
+    Pairs of links that the hand's SRDF lists may touch. The links that carry a contact touch the object; they may sink
+    into it by `touch_depth`, since a collision shape only approximates the surface. Meshes that bound a convex solid
+    are solid. Other meshes of a link with a contact count by their convex hulls where they meet the object; those of an
+    object are surfaces, and what touches them is made thinner by `touch_depth`. Hulls with more than some 250 corners
+    are thinned, to 0.1 mm; `thinned` tells which.
+
+    Any number of threads may use one checker. Answers are functions of the grasp alone.
+
+    Args:
+        problem: The problem; hand and object need collision shapes.
+        touch_depth: Depth to which a touching link may sink into the object [m].
+        clearance: Distance that all other pairs must keep [m].
+
+    Attributes:
+        pairs: Names of the shapes of each pair that is looked at [p].
+        required: Distance that each pair must keep, less what it may sink in [p], metres.
+        thinned: How far the hulls that were thinned reach beyond what is left of them, by the shapes' names [m].
+
+    Raises:
+        GraspAtlasError: If hand or object has no collision shape, or a mesh or the SRDF cannot be read.
+    """
+
+    def __init__(self, problem: Problem, touch_depth: float = 0.002, clearance: float = 0.0) -> None:
+        self._hand = problem.hand
+        model = _core.Model(problem.hand.tree, problem.object_joint)
+        shapes, pairs = _joined(problem, model.object_joint, touch_depth, clearance)
+        self._shapes = tuple(shapes)
+        self._size = model.q_size
+        self.pairs = tuple((shapes[pair.first].name, shapes[pair.second].name) for pair in pairs)
+        self.required: Array = np.array([pair.required for pair in pairs])
+        self.thinned = {shape.name: shape.error for shape in shapes if shape.error > 0.0}
+        numbers = np.array([(pair.first, pair.second) for pair in pairs], np.int32).reshape(-1, 2)
+        self._core = _core.CollisionBatch(model, [shape.as_tuple() for shape in shapes], numbers, self.required)
+
+    def first_collision(self, x: ArrayLike) -> tuple[str, str] | None:
+        """Names of the first two shapes found in collision at a grasp, or None.
+
+        Args:
+            x: The grasp [configuration_size].
+        """
+        (hit,) = self._core.first_hits(self._rows(np.asarray(x, float)[None]))
+        return None if hit < 0 else self.pairs[hit]
+
+    def free(self, X: ArrayLike) -> NDArray[np.bool_]:
+        """Whether each grasp is free of collision [n].
+
+        Args:
+            X: One grasp a row [n, configuration_size].
+        """
+        rows = self._rows(X)
+        out = np.empty(len(rows), bool)
+        bar = tqdm(total=len(rows), desc="collisions", unit=" grasps", delay=1.0, disable=not sys.stderr.isatty())
+        with bar:
+            for start in range(0, len(rows), BATCH):
+                batch = rows[start : start + BATCH]
+                out[start : start + BATCH] = self._core.free(batch)
+                bar.update(len(batch))
+        return out
+
+    def clearances(self, X: ArrayLike, pairs: ArrayLike | None = None) -> Array:
+        """Distance of each pair of shapes, less the distance that it must keep; negative in collision [n, p], metres.
+
+        Args:
+            X: One grasp a row [n, configuration_size].
+            pairs: Numbers of the pairs [p], in the order of the attribute `pairs`; all by default.
+        """
+        chosen = self._chosen(pairs)
+        return np.asarray(self._core.nearest(self._rows(X), chosen)["distances"] - self.required[chosen])
+
+    def nearest(self, X: ArrayLike, pairs: ArrayLike | None = None) -> Nearest:
+        """Signed distance, nearest points and normal of pairs of shapes.
+
+        Distances of shapes that are apart are exact to 1e-10 m, depths to 1e-6 m.
+
+        Args:
+            X: One grasp a row [n, configuration_size].
+            pairs: Numbers of the pairs [p], in the order of the attribute `pairs`; all by default.
+        """
+        chosen = self._chosen(pairs)
+        found = self._core.nearest(self._rows(X), chosen)
+        return Nearest(tuple(self.pairs[i] for i in chosen), **found)
+
+    def depths(self, x: ArrayLike, frame: str | None, points: ArrayLike) -> Array:
+        """How far points are from the collision shapes of a link or of the object, at a grasp.
+
+        Args:
+            x: The grasp [configuration_size].
+            frame: Link of the hand, of which the shapes of its joint count; the object where there is none.
+            points: The points in the palm's frame [n, 3], metres.
+
+        Returns:
+            Distance of each point from the nearest shape [n], metres: negative inside, but for meshes that are not
+            convex, and infinite where there is no shape.
+        """
+        joint = None if frame is None else self._hand.frame(frame)[0]
+        chosen = [
+            i
+            for i, shape in enumerate(self._shapes)
+            if (_in_object(shape) if joint is None else not _in_object(shape) and shape.joint == joint)
+        ]
+        rows, at = self._rows(np.asarray(x, float)[None]), np.atleast_2d(np.asarray(points, float))
+        return np.asarray(self._core.point_distances(rows, np.array(chosen, np.int32), at)[0])
+
+    def _rows(self, X: ArrayLike) -> Array:
+        """The configurations in grasps, one a row."""
+        rows = np.asarray(X, float)
+        if rows.ndim != 2 or rows.shape[1] < self._size:
+            raise GraspAtlasError(
+                f"grasps must be an array [n, configuration_size] with at least {self._size} columns; "
+                f"its shape is {rows.shape}"
+            )
+        return np.ascontiguousarray(rows[:, : self._size])
+
+    def _chosen(self, pairs: ArrayLike | None) -> NDArray[np.int32]:
+        return np.arange(len(self.pairs), dtype=np.int32) if pairs is None else np.asarray(pairs, np.int32)
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """Numbers of two shapes, and the distance that they must keep [m]."""
+
+    first: int
+    second: int
+    required: float
+
+
+def _joined(
+    problem: Problem, object_joint: int, touch_depth: float, clearance: float
+) -> tuple[list[Shape], list[_Pair]]:
+    """Shapes of hand and object, and the pairs to look at: those in the hand, then those with the object."""
+    shapes = _shapes(problem.hand, problem.hand.tree)
+    in_hand = list(enumerate(shapes))
+    pairs = [_Pair(a, b, clearance) for a, b in _hand_pairs(shapes, problem.hand)]
+    touching = {problem.hand.frame(contact.frame)[0] for contact in problem.contacts}
+    for shape in _shapes(problem.object, problem.object.urdf):
+        second = len(shapes)
+        shapes.append(replace(shape, name=OBJECT + shape.name, joint=object_joint))
+        for first, of_link in in_hand:
+            if of_link.joint not in touching:
+                pairs.append(_Pair(first, second, clearance))
+            elif not (of_link.is_mesh or shape.is_mesh):
+                pairs.append(_Pair(first, second, -touch_depth))
+            elif (stand_in := _may_touch(of_link, shape.is_mesh, touch_depth)) is not None:
+                pairs.append(_Pair(len(shapes), second, 0.0 if shape.is_mesh else -touch_depth))
+                shapes.append(stand_in)
+    return shapes, pairs
+
+
+def _may_touch(shape: Shape, surface: bool, touch_depth: float) -> Shape | None:
+    """A stand-in for a link's shape, where coal knows no depth of the pair: its hull, thinner where it meets a mesh.
+
+    None when nothing is left of it.
+    """
+    hull = convex_hull(shape)
+    if hull.is_mesh:
+        raise GraspAtlasError(
+            f"the collision mesh '{shape.name}' touches the object and is flat; give it some thickness"
+        )
+    return thinner(hull, touch_depth) if surface else hull
+
+
+def _in_object(shape: Shape) -> bool:
+    return shape.name.startswith(OBJECT)
+
+
+def _shapes(body: Body, tree: str) -> list[Shape]:
+    """Collision shapes of a body, convex meshes as solids."""
+    check_meshes(body)
+    try:
+        shapes = read_shapes(tree, body.urdf, body.package_dirs)
+    except GraspAtlasError as error:
+        reason = " ".join(str(error).split())
+        raise GraspAtlasError(f"collision shapes of '{body.name}' cannot be read: {reason}") from None
+    if not shapes:
+        raise GraspAtlasError(f"'{body.name}' has no collision shape; give its URDF <collision> elements")
+    return [convex_solid(shape) for shape in shapes]
+
+
+def _hand_pairs(shapes: list[Shape], hand: Body) -> Iterator[tuple[int, int]]:
+    """Pairs of the hand's shapes that must not touch; without an SRDF those of neighbouring joints may."""
+    may_touch = _disabled(hand)
+    for i, a in enumerate(shapes):
+        for j, b in enumerate(shapes[i + 1 :], i + 1):
+            neighbours = not hand.srdf and (a.parent_joint == b.joint or b.parent_joint == a.joint)
+            if a.joint != b.joint and not neighbours and frozenset((a.link, b.link)) not in may_touch:
+                yield i, j
+
+
+def _disabled(hand: Body) -> set[frozenset[str]]:
+    """Pairs of links that the hand's SRDF lists."""
+    if not hand.srdf:
+        return set()
+    try:
+        elements = ElementTree.fromstring(hand.srdf).iter("disable_collisions")
+        return {frozenset((element.attrib["link1"], element.attrib["link2"])) for element in elements}
+    except ElementTree.ParseError as error:
+        raise GraspAtlasError(f"the SRDF of '{hand.name}' is not XML: {error}") from None
+    except KeyError as error:
+        raise GraspAtlasError(f"a disable_collisions element in the SRDF of '{hand.name}' has no {error}") from None

@@ -1,0 +1,221 @@
+"""Grasps in files for other programs: one JSON object with names, frames and units, or one flat CSV row a grasp."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graspatlas import _core
+from graspatlas.errors import GraspAtlasError
+from graspatlas.grasps.grasps import Grasps
+from graspatlas.hand.urdf import root_link
+from graspatlas.quality.evaluation import INDICES, evaluate, quality_name
+from graspatlas.requirements.screening import requirement_name
+from graspatlas.support.files import replaced, write_csv
+from graspatlas.support.validation import joined, pose_columns, shown
+
+if TYPE_CHECKING:
+    from graspatlas.result.result import Result
+
+__all__ = ["ENDINGS", "FORMAT", "FORMAT_VERSION", "Selection", "grasp_columns", "save_grasps", "select"]
+
+Array = NDArray[np.float64]
+
+#: What a file of grasps may end in.
+ENDINGS = (".csv", ".json")
+FORMAT = "graspatlas grasps"
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Some grasps of a result, with all that is known about each.
+
+    Attributes:
+        grasps: The grasps [n].
+        charts: Chart of each [n]; of the refined best the one its climb began from.
+        refined: True for the refined best, which is no chart's centre [n].
+        feasible: Whether each meets the result's requirements [n].
+        indices: Values of the result's indices by name, [n] each; NaN where one was not stored.
+    """
+
+    grasps: Grasps
+    charts: NDArray[np.int64]
+    refined: NDArray[np.bool_]
+    feasible: NDArray[np.bool_]
+    indices: dict[str, Array]
+
+    def columns(self) -> dict[str, Any]:
+        """Columns of a flat table: chart, flags, indices, joints, poses and contacts."""
+        flags = {"chart": self.charts, "refined": self.refined, "feasible": self.feasible}
+        return joined(flags, self.indices, grasp_columns(self.grasps), _contact_columns(self.grasps))
+
+    def records(self) -> list[dict[str, Any]]:
+        """One table a grasp, as the JSON file has it."""
+        grasps = self.grasps
+        joints = np.array(list(grasps.joint_positions.values())).T.tolist()
+        object_xyz, object_quat = grasps.object_xyz.tolist(), grasps.object_quat_xyzw.tolist()
+        palm_xyz, palm_quat = grasps.palm_xyz.tolist(), grasps.palm_quat_xyzw.tolist()
+        points, normals = grasps.contact_points_in_object.tolist(), grasps.contact_normals_in_object.tolist()
+        return [
+            {
+                "chart": int(self.charts[i]),
+                "refined": bool(self.refined[i]),
+                "feasible": bool(self.feasible[i]),
+                "indices": {name: _finite(values[i]) for name, values in self.indices.items()},
+                "joints": dict(zip(grasps.joints, joints[i], strict=True)),
+                "palm_in_object": {"xyz": palm_xyz[i], "quat_xyzw": palm_quat[i]},
+                "object_in_palm": {"xyz": object_xyz[i], "quat_xyzw": object_quat[i]},
+                "contacts": [
+                    {"frame": frame, "point": point, "normal": normal}
+                    for frame, point, normal in zip(grasps.contact_frames, points[i], normals[i], strict=True)
+                ],
+            }
+            for i in range(len(grasps))
+        ]
+
+
+def select(
+    result: Result,
+    *,
+    charts: Sequence[int] | None = None,
+    best: int | None = None,
+    feasible: bool = False,
+    refined: bool = False,
+) -> Selection:
+    """Choose grasps of a result; see :meth:`graspatlas.Result.save_grasps` for the arguments and errors."""
+    if charts is not None and (best is not None or feasible):
+        raise GraspAtlasError("give either charts, or best and feasible")
+    if refined and result.refinement is None:
+        raise GraspAtlasError("this result was not refined: give optimize refine=True")
+    if charts is not None:
+        rows = np.array([result.checked_chart(chart) for chart in charts], np.int64)
+        if len(rows) == 0:
+            raise GraspAtlasError("charts names none; give some, or leave it out for all")
+    elif best is not None:
+        rows = _best(result, best)
+    else:
+        rows = result.candidates() if feasible else np.arange(result.atlas.n_charts)
+    names = [quality_name(result.quality), *result.others]
+    values = [values[rows] for values in (result.qualities, *result.others.values())]
+    X, flags, numbers = result.atlas.centers[rows], result.feasible[rows], rows.astype(np.int64)
+    if refined:
+        top = result.refined_best
+        at_top = [np.array([top.quality]), *(_at(result, top.x, name) for name in result.others)]
+        values = [np.concatenate(pair) for pair in zip(at_top, values, strict=True)]
+        X, flags, numbers = np.vstack([top.x, X]), np.append(True, flags), np.append(top.chart, numbers)
+    return Selection(
+        grasps=Grasps(result.problem, X.reshape(-1, result.atlas.centers.shape[1])),
+        charts=numbers,
+        refined=np.arange(len(numbers)) < refined,
+        feasible=flags,
+        indices=dict(zip(names, values, strict=True)),
+    )
+
+
+def _best(result: Result, count: int) -> NDArray[np.int64]:
+    """The best charts that meet the requirements, the best first; of equals the first."""
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
+        raise GraspAtlasError(f"best must be a whole number of at least 1, got {shown(count)}")
+    candidates = result.candidates()
+    order = np.argsort(-result.qualities[candidates], kind="stable")
+    return np.asarray(candidates[order[:count]], np.int64)
+
+
+def _at(result: Result, x: Array, name: str) -> Array:
+    """Value of an index at a refined grasp [1]; NaN when it was a callable, which is not stored."""
+    if name not in INDICES:
+        return np.array([np.nan])
+    system: _core.GraspSystem = result.atlas.system  # type: ignore[assignment]
+    if result.refinement is not None and result.refinement.all_motions:
+        system = result.problem.full_system
+    return evaluate(name, Grasps(result.problem, x, system))
+
+
+def grasp_columns(grasps: Grasps) -> dict[str, Array]:
+    """Columns of joints by name [rad or m], and of the poses of palm and object in one another's frames.
+
+    Raises:
+        GraspAtlasError: If a joint has the name of another column.
+    """
+    return joined(
+        grasps.joint_positions,
+        pose_columns("palm", grasps.palm_xyz, grasps.palm_quat_xyzw),
+        pose_columns("object", grasps.object_xyz, grasps.object_quat_xyzw),
+    )
+
+
+def _contact_columns(grasps: Grasps) -> dict[str, Any]:
+    """Columns of each contact: its frame, its point and the object's outward normal, in the object's frame."""
+    points, normals = grasps.contact_points_in_object, grasps.contact_normals_in_object
+    columns: dict[str, Any] = {}
+    for i, frame in enumerate(grasps.contact_frames):
+        columns[f"contact{i}_frame"] = [frame] * len(grasps)
+        columns |= {f"contact{i}_{axis}": points[:, i, a] for a, axis in enumerate("xyz")}
+        columns |= {f"contact{i}_n{axis}": normals[:, i, a] for a, axis in enumerate("xyz")}
+    return columns
+
+
+def save_grasps(result: Result, path: str | os.PathLike[str], **choice: Any) -> int:
+    """Write grasps of a result; see :meth:`graspatlas.Result.save_grasps`.
+
+    Args:
+        result: The result.
+        path: Ends in one of ``ENDINGS``.
+        **choice: Arguments of :func:`select`.
+
+    Returns:
+        How many grasps were written.
+    """
+    target = Path(path)
+    if target.suffix not in ENDINGS:
+        raise GraspAtlasError(f"a file of grasps must end in {' or '.join(ENDINGS)}, got '{target}'")
+    selection = select(result, **choice)
+    if target.suffix == ".csv":
+        write_csv(target, selection.columns())
+    else:
+        head = json.dumps(_header(result, selection), indent=2)
+        rows = ",\n".join(f"    {json.dumps(record, allow_nan=False)}" for record in selection.records())
+        with replaced(target) as stream:
+            stream.write(f'{head[:-2]},\n  "grasps": [\n{rows}\n  ]\n}}\n'.encode())
+    return len(selection.grasps)
+
+
+def _header(result: Result, selection: Selection) -> dict[str, Any]:
+    """What holds for all grasps of a file."""
+    from graspatlas.version import __version__
+
+    problem = result.problem
+    return {
+        "format": FORMAT,
+        "version": FORMAT_VERSION,
+        "graspatlas": __version__,
+        "problem": problem.name,
+        "hand": problem.hand.name,
+        "object": problem.object.name,
+        "frames": {"palm": root_link(problem.hand.urdf), "object": root_link(problem.object.urdf)},
+        "units": {
+            "xyz": "m",
+            "point": "m",
+            "quat_xyzw": "unit quaternion x y z w",
+            "joints": {joint.name: "m" if joint.prismatic else "rad" for joint in problem.hand.model.hand_joints},
+        },
+        "quality": quality_name(result.quality),
+        "requirements": [requirement_name(requirement) for requirement in result.requirements],
+        "status": str(result.status),
+        "n_charts": result.atlas.n_charts,
+        "n_grasps": len(selection.grasps),
+    }
+
+
+def _finite(value: float) -> float | None:
+    """A number that JSON knows, or nothing."""
+    return float(value) if math.isfinite(value) else None

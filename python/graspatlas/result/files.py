@@ -1,0 +1,244 @@
+"""Results in files: an NPZ archive of arrays, and a header in JSON. Reading one executes nothing in it."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, fields, replace
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graspatlas.atlas.atlas import LARGEST, Atlas, Audit, Status
+from graspatlas.errors import GraspAtlasError
+from graspatlas.problem.problem import Problem
+from graspatlas.quality.evaluation import quality_name
+from graspatlas.requirements.screening import Require, parse_requirement, requirement_name
+from graspatlas.result.refinement import Refinement
+from graspatlas.support.archives import DamagedArchive, read_arrays
+from graspatlas.support.files import is_folder, opened, replaced, stated_path
+from graspatlas.support.validation import number, shown
+
+if TYPE_CHECKING:
+    from graspatlas.result.result import Result
+
+__all__ = ["read_result", "save_result"]
+
+FORMAT = "graspatlas result"
+FORMAT_VERSION = 1
+#: How far a stored quaternion may be from length one.
+UNIT_TOLERANCE = 1e-6
+
+_REFINEMENT_FLAGS = ("all_motions", "complete")
+_REFINEMENT_ARRAYS = tuple(f.name for f in fields(Refinement) if f.name not in _REFINEMENT_FLAGS)
+
+
+def save_result(result: Result, path: str | os.PathLike[str]) -> None:
+    """Write a result to one file; see :meth:`graspatlas.Result.save`.
+
+    Args:
+        result: The result.
+        path: The file.
+
+    Raises:
+        GraspAtlasError: If it cannot be written.
+    """
+    header = {
+        "format": FORMAT,
+        "version": FORMAT_VERSION,
+        "problem": result.problem.to_dict(),
+        "torque_length": result.problem.torque_arm,
+        "dimension": result.dimension,
+        "radius": result.atlas.radius,
+        "epsilon": result.atlas.epsilon,
+        "status": result.status.name,
+        "seconds": result.atlas.seconds,
+        "audit": asdict(result.atlas.audit),
+        "quality": quality_name(result.quality),
+        "quality_seconds": result.quality_seconds,
+        "requirements": [requirement_name(r) for r in result.requirements],
+        "refused": dict(result.refused),
+        "others": list(result.others),
+    }
+    extra: dict[str, Any] = {f"other_{i}": values for i, values in enumerate(result.others.values())}
+    if result.refinement is not None:
+        header["refinement"] = {name: getattr(result.refinement, name) for name in _REFINEMENT_FLAGS}
+        extra |= {f"refined_{name}": getattr(result.refinement, name) for name in _REFINEMENT_ARRAYS}
+    with replaced(path) as stream:
+        np.savez(  # compression would take longer than the atlas
+            stream,
+            header=json.dumps(header),
+            qualities=result.qualities,
+            feasible=result.feasible,
+            **extra,
+            **result.atlas.to_arrays(),
+        )
+
+
+def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The attributes of a result that was saved; see :func:`graspatlas.load_result`.
+
+    Args:
+        path: The file, or a folder that holds ``result.npz``.
+
+    Raises:
+        GraspAtlasError: If the file is missing, damaged, or of another version.
+    """
+    source = stated_path(path, "read result")
+    if is_folder(source):
+        source = source / "result.npz"
+    try:
+        with opened(source, "result") as stream:
+            header, arrays = _read(stream)
+    except FileNotFoundError:
+        raise GraspAtlasError(
+            f"result '{source}' does not exist; 'graspatlas optimize ... --output FOLDER' writes one"
+        ) from None
+    except OSError as error:
+        raise GraspAtlasError(f"cannot read result '{source}': {error.strerror or error}") from None
+    except GraspAtlasError:
+        raise
+    except (DamagedArchive, KeyError, ValueError, RecursionError) as error:
+        reason = f" ({error})" if isinstance(error, DamagedArchive) else ""
+        raise GraspAtlasError(f"'{source}' is damaged or not a graspatlas result{reason}; compute it again") from None
+    if header.get("version") != FORMAT_VERSION:
+        version = shown(header.get("version"))
+        raise GraspAtlasError(f"result '{source}' has version {version}, this graspatlas reads {FORMAT_VERSION}")
+    return _parts(header, arrays, source)
+
+
+def _read(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Header and arrays of a result file."""
+    arrays = read_arrays(stream)
+    header = json.loads(str(arrays.pop("header")))
+    json.dumps(header, ensure_ascii=False).encode("utf-8")  # a name may hold half of a letter, which nothing can write
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise ValueError("its header is another one")
+    return header, arrays
+
+
+def _parts(header: Mapping[str, Any], arrays: dict[str, Any], source: os.PathLike[str]) -> dict[str, Any]:
+    """Attributes of a result, once all of them are sound."""
+    try:
+        problem = _with_torque_length(Problem.from_dict(header["problem"]), header)
+        qualities, feasible = arrays.pop("qualities"), arrays.pop("feasible")
+        others = {str(name): arrays.pop(f"other_{i}") for i, name in enumerate(header.get("others", []))}
+        refinement = _refinement(header.get("refinement"), arrays, problem)
+        atlas = Atlas(
+            system=problem.system(header["dimension"]),
+            radius=number(header["radius"], "radius"),
+            epsilon=number(header["epsilon"], "epsilon"),
+            status=Status[header["status"]],
+            seconds=number(header["seconds"], "seconds"),
+            audit=_audit(header["audit"]),
+            **arrays,
+        )
+        atlas.check_arrays()
+        if qualities.shape != (atlas.n_charts,) or feasible.shape != qualities.shape or feasible.dtype != bool:
+            raise GraspAtlasError("qualities and feasible need one entry a chart")
+        for values in (qualities, *others.values()):
+            if values.shape != qualities.shape or values.dtype.kind != "f" or np.isnan(values).any():
+                raise GraspAtlasError("qualities must be numbers, one a chart")
+        _check_header(header, atlas)
+        check_configurations(problem, atlas.centers, "the centre of chart")
+        return {
+            "problem": problem,
+            "atlas": atlas,
+            "quality": header["quality"],
+            "qualities": qualities,
+            "quality_seconds": number(header["quality_seconds"], "quality_seconds"),
+            "requirements": tuple(_stored_requirement(str(text)) for text in header["requirements"]),
+            "feasible": feasible,
+            "refused": {str(name): int(count) for name, count in header["refused"].items()},
+            "others": others,
+            "refinement": refinement,
+        }
+    except GraspAtlasError as error:
+        raise GraspAtlasError(f"result '{source}' is damaged: {error}; compute it again") from None
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError, RecursionError) as error:
+        raise GraspAtlasError(f"result '{source}' is damaged ({shown(error)}); compute it again") from None
+
+
+def _audit(table: Mapping[str, Any]) -> Audit:
+    """The audit of an atlas."""
+    points, holes = (int(number(table[name], name)) for name in ("points", "holes"))
+    seconds = number(table["seconds"], "seconds")
+    if min(points, holes) < 0 or not 0.0 <= seconds < np.inf:
+        raise GraspAtlasError("the audit must have counts and a time that are not negative")
+    return Audit(points, holes, seconds)
+
+
+def _check_header(header: Mapping[str, Any], atlas: Atlas) -> None:
+    """Make sure that numbers and names of a header are ones that a result can have.
+
+    Raises:
+        GraspAtlasError: If one is not.
+    """
+    seconds = number(header["quality_seconds"], "quality_seconds")
+    if not 0.0 < atlas.radius < LARGEST:
+        raise GraspAtlasError(f"radius must be positive and below {LARGEST:g}, got {atlas.radius:g}")
+    if not 0.0 < atlas.epsilon < 1.0:
+        raise GraspAtlasError(f"epsilon must lie between 0 and 1, got {atlas.epsilon:g}")
+    if not (0.0 <= atlas.seconds < np.inf and 0.0 <= seconds < np.inf):
+        raise GraspAtlasError("seconds must be finite and not negative")
+    if not isinstance(header["quality"], str):
+        raise GraspAtlasError(f"quality must be the name of an index, got {shown(header['quality'])}")
+
+
+def check_configurations(problem: Problem, X: NDArray[np.float64], what: str) -> None:
+    """Make sure that configurations name one each: quaternions, cosines and sines have length one.
+
+    Args:
+        problem: The problem.
+        X: Configurations [n, configuration_size].
+        what: What they are, for the message.
+
+    Raises:
+        GraspAtlasError: If one is off.
+    """
+    n_hand = problem.hand.model.hand_q_size
+    turning = [joint.q_index for joint in problem.hand.model.hand_joints if joint.q_size == 2]
+    parts = [("the cosine and sine of a continuous joint", slice(at, at + 2)) for at in turning]
+    at, size = (n_hand + 3, 4) if problem.object_joint == "free_flyer" else (n_hand + 2, 2)
+    parts.append(("the object's rotation", slice(at, at + size)))
+    for name, columns in parts:
+        lengths = np.linalg.norm(X[:, columns], axis=1)
+        off = np.flatnonzero(~(np.abs(lengths - 1.0) < UNIT_TOLERANCE))
+        if len(off):
+            raise GraspAtlasError(f"{name} has length {lengths[off[0]]:g}, not 1, at {what} {off[0]}")
+
+
+def _with_torque_length(problem: Problem, header: Mapping[str, Any]) -> Problem:
+    """The problem with the torque length that the result was computed with, should another one be found today."""
+    length = number(header["torque_length"], "torque_length")
+    return problem if length in (problem.torque_arm, 0.0) else replace(problem, torque_length=length)
+
+
+def _refinement(flags: Mapping[str, Any] | None, arrays: dict[str, Any], problem: Problem) -> Refinement | None:
+    """The refinement of a result file, taken out of its arrays."""
+    if flags is None:
+        return None
+    parts = {name: arrays.pop(f"refined_{name}") for name in _REFINEMENT_ARRAYS}
+    p = len(parts["x"])
+    kinds = {"x": "f", "qualities": "f", "starts": "i", "converged": "b", "unbounded": "b", "steps": "i"}
+    shapes = {**dict.fromkeys(kinds, (p,)), "x": (p, problem.full_system.configuration_size)}
+    for name, array in parts.items():
+        if p == 0 or array.shape != shapes[name] or array.dtype.kind != kinds[name] or not _sound(name, array):
+            raise GraspAtlasError(f"the refined {name} have shape {array.shape} and type {array.dtype}")
+    check_configurations(problem, parts["x"], "refined grasp")
+    return Refinement(**parts, all_motions=bool(flags["all_motions"]), complete=bool(flags["complete"]))
+
+
+def _sound(name: str, array: Any) -> bool:
+    """Whether all numbers are finite; qualities that run away may be infinite."""
+    return bool((~np.isnan(array) if name == "qualities" else np.isfinite(array)).all())
+
+
+def _stored_requirement(text: str) -> Require | str:
+    """The requirement of a name; the name alone of a callable, which is not stored."""
+    try:
+        return parse_requirement(text)
+    except GraspAtlasError:
+        return text

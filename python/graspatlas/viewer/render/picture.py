@@ -1,0 +1,213 @@
+"""A picture of the best grasp, or of the best and the worst, drawn without browser, graphics card or display."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from graspatlas.errors import GraspAtlasError
+from graspatlas.viewer.render.raster import Fragments, fragments, nearest
+from graspatlas.viewer.render.shading import FloorShadow, Shadow, crevices, dots, lamps, shade, to_linear, to_screen
+from graspatlas.viewer.render.text_images import GREY, caption_image, legend_image, text_image
+from graspatlas.viewer.scene.camera import Camera
+from graspatlas.viewer.scene.captions import caption, legend, subtitle
+from graspatlas.viewer.scene.scene import SHOW_THROUGH, Part, Scene
+
+__all__ = ["check_size", "draw", "painted"]
+
+Array = NDArray[np.float64]
+FloatArray = NDArray[np.float32]
+
+#: Smallest picture [pixels].
+MIN_WIDTH, MIN_HEIGHT = 320, 180
+#: Largest side of a picture [pixels]: each takes a kilobyte while it is drawn.
+MAX_SIDE = 8192
+#: Widths of the legend and of a caption, as multiples of the height of the caption's title, with room beside them.
+LEGEND_LETTERS, CAPTION_LETTERS = 32.0, 20.0
+#: Each pixel is the mean of this many by this many.
+SAMPLES = 2
+#: The background is computed for one in so many samples each way.
+COARSE = 4
+#: Where the grasps are in the picture, which spans -1 to 1: left, right, bottom, top.
+WINDOW = (-0.88, 0.88, -0.54, 0.86)
+#: Screen colours of the background, at the top and at the bottom.
+BACKGROUND = ((0.985, 0.988, 0.992), (0.855, 0.868, 0.885))
+#: Share of the light that the darkest crevice loses.
+CREVICE = 0.75
+
+
+def check_size(width: int, height: int) -> None:
+    """Make sure that a picture of this size has room for its captions.
+
+    Raises:
+        GraspAtlasError: If it has not.
+    """
+    whole = all(isinstance(side, int) and not isinstance(side, bool) for side in (width, height))
+    if not whole or width < MIN_WIDTH or height < MIN_HEIGHT or max(width, height) > MAX_SIDE:
+        raise GraspAtlasError(
+            f"a picture needs at least {MIN_WIDTH} by {MIN_HEIGHT} pixels and at most {MAX_SIDE} a side, "
+            f"got {width!r} by {height!r}"
+        )
+
+
+def draw(scene: Scene, width: int, height: int) -> Image.Image:
+    """The picture of a scene, with captions."""
+    camera = scene.camera(width / height, WINDOW)
+    image = painted([part for exhibit in scene.exhibits for part in exhibit.parts], camera, width, height)
+    _write(image, scene, camera)
+    return image
+
+
+def painted(parts: list[Part], camera: Camera, width: int, height: int) -> Image.Image:
+    """Parts as a camera sees them, without words."""
+    painter = _Painter(parts, camera, width * SAMPLES, height * SAMPLES)
+    samples = painter.paint().reshape(height, SAMPLES, width, SAMPLES, 3)
+    light = np.zeros((height, width, 3))
+    for i, j in np.ndindex(SAMPLES, SAMPLES):
+        light += samples[:, i, :, j] / SAMPLES**2
+    return Image.fromarray(np.round(255.0 * np.clip(to_screen(light), 0.0, 1.0)).astype(np.uint8))
+
+
+def _write(image: Image.Image, scene: Scene, camera: Camera) -> None:
+    """Put captions under the grasps, the legend at the foot and the subtitle at the head."""
+    width, height = image.size
+    size = min(height / 22.0, width / max(LEGEND_LETTERS, CAPTION_LETTERS * len(scene.exhibits)))
+    words = [caption(scene.result, exhibit) for exhibit in scene.exhibits]
+    seen = [camera.project(exhibit.points, width / height)[:, 0] for exhibit in scene.exhibits]
+    middles = [width * float(x.min() + x.max() + 2.0) / 4.0 for x in seen]
+    room = min([*np.diff(middles), 2.0 * middles[0], 2.0 * (width - middles[-1])]) - size
+    widest = max(caption_image(w, size).width for w in words)
+    for middle, w in zip(middles, words, strict=True):
+        text = caption_image(w, size * min(1.0, room / widest))
+        image.paste(text, (int(middle - text.width / 2.0), int(0.782 * height)), text)
+    foot = legend_image(legend(), 0.54 * size)
+    image.paste(foot, ((width - foot.width) // 2, int(height - 1.65 * foot.height)), foot)
+    head = text_image([(subtitle(scene.result), 0.58 * size, GREY)])
+    image.paste(head, (int(0.8 * size), int(0.7 * size)), head)
+
+
+class _Triangles:
+    """Triangles of several parts, placed in the world and on the screen."""
+
+    def __init__(self, parts: list[Part], camera: Camera, width: int, height: int) -> None:
+        placed = [part.mesh.moved(part.T) for part in parts]
+        none = np.zeros((0, 3, 3))
+        self.points = np.concatenate([none, *(m.vertices[m.faces] for m in placed)])
+        self.normals = np.concatenate([none, *(m.normals[m.faces] for m in placed)]).astype(np.float32)
+        owner = np.repeat(np.arange(len(parts)), [len(m.faces) for m in placed])
+        colours = np.array([part.colour for part in parts]).reshape(-1, 4)
+        self.colours = np.column_stack([to_linear(colours[:, :3]), colours[:, 3]]).astype(np.float32)[owner]
+        seen = camera.project(self.points.reshape(-1, 3), width / height)
+        x, y = (seen[:, 0] + 1.0) * width / 2.0, (1.0 - seen[:, 1]) * height / 2.0
+        self.screen = np.column_stack([x, y, seen[:, 2]]).reshape(-1, 3, 3)
+
+    def surface(self, found: Fragments) -> tuple[FloatArray, FloatArray]:
+        """Points and unnormalised normals of fragments [n, 3]."""
+        near = self.screen[:, :, 2].astype(np.float32)[found.triangles]
+        weights = found.weights * near
+        weights /= (weights[:, 0] + weights[:, 1] + weights[:, 2])[:, None]
+        points = np.einsum("ij,ijk->ik", weights, self.points.astype(np.float32)[found.triangles])
+        normals = np.einsum("ij,ijk->ik", weights, self.normals[found.triangles])
+        return points, normals
+
+
+class _Painter:
+    """Paints parts into an array of linear light, from back to front."""
+
+    def __init__(self, parts: list[Part], camera: Camera, width: int, height: int) -> None:
+        self.camera, self.width, self.height = camera, width, height
+        self.lamps = lamps(camera)
+        marks = [p for p in parts if p.group in SHOW_THROUGH]
+        bodies = [p for p in parts if p.group in ("hand", "object")]
+        self.solid = self._triangles([p for p in parts if p.colour[3] >= 1.0])
+        self.clear = self._triangles([p for p in parts if p.colour[3] < 1.0])
+        self.marks = self._triangles([replace(p, colour=(*p.colour[:3], SHOW_THROUGH[p.group])) for p in marks])
+        body = self._triangles(bodies).points
+        self.shadow = Shadow(self._triangles([p for p in bodies if p.colour[3] >= 1.0]).points, self.lamps[0])
+        self.floor = FloorShadow(body)
+        self.nearness = np.zeros(width * height, np.float32)
+
+    def _triangles(self, parts: list[Part]) -> _Triangles:
+        return _Triangles(parts, self.camera, self.width, self.height)
+
+    def paint(self) -> FloatArray:
+        """Linear light [height * width, 3]."""
+        light = self._background()
+        found = nearest(self.solid.screen, self.width, self.height)
+        light[found.pixels] = self._shaded(self.solid, found)[0]
+        self.nearness[found.pixels] = found.nearness
+        self._darken_crevices(light)
+        self._paint_clear(light)
+        self._paint_marks(light)
+        return light
+
+    def _background(self) -> FloatArray:
+        """A soft gradient, and the shadow on the floor; smooth, so that few pixels do."""
+        rows, columns = self.height // COARSE, self.width // COARSE
+        x, y = np.meshgrid(np.linspace(-1.0, 1.0, columns), np.linspace(1.0, -1.0, rows))
+        half = np.tan(self.camera.field_of_view / 2.0)
+        screen = np.stack([x * half * self.width / self.height, y * half, -np.ones_like(x)], axis=-1)
+        rays = screen @ self.camera.axes
+        steps = (self.floor.height - self.camera.position[2]) / np.minimum(rays[..., 2:], -1e-9)
+        dark = self.floor.at((self.camera.position + steps * rays)[..., :2].reshape(-1, 2))
+        top, bottom = (to_linear(np.array(colour)) for colour in BACKGROUND)
+        light = top + (bottom - top) * (0.5 - 0.5 * y[..., None]) ** 1.5
+        light *= (1.0 - dark.reshape(rows, columns, 1)) * (1.0 - 0.10 * x[..., None] ** 4)
+        size = (self.width, self.height)
+        bands = [
+            Image.fromarray(light[..., k].astype(np.float32)).resize(size, Image.Resampling.BILINEAR) for k in range(3)
+        ]
+        return np.stack([np.asarray(band) for band in bands], axis=-1).reshape(-1, 3)
+
+    def _shaded(
+        self, triangles: _Triangles, found: Fragments, *, shadows: bool = True
+    ) -> tuple[FloatArray, FloatArray]:
+        """Light [n, 3] of fragments, and how squarely they face the camera [n]."""
+        points, normals = triangles.surface(found)
+        to_camera = self.camera.position.astype(np.float32) - points
+        to_camera /= np.sqrt(dots(to_camera, to_camera))[:, None]
+        outward = np.where(dots(normals, to_camera) < 0.0, -1.0, 1.0)
+        normals *= (outward / np.sqrt(dots(normals, normals)))[:, None].astype(np.float32)
+        lit = self.shadow.lit(points, normals) if shadows else np.ones(len(points), np.float32)
+        colours = triangles.colours[found.triangles, :3]
+        return shade(colours, normals, to_camera, lit, self.lamps), dots(normals, to_camera)
+
+    def _darken_crevices(self, light: FloatArray) -> None:
+        near = self.nearness.reshape(self.height, self.width)[::SAMPLES, ::SAMPLES]
+        with np.errstate(divide="ignore"):
+            depth = 1.0 / near
+        metre = near.shape[0] / (2.0 * np.tan(self.camera.field_of_view / 2.0) * self.camera.distance)
+        kept = np.where(near > 0.0, 1.0 - CREVICE * crevices(depth, metre), 1.0).astype(np.float32)
+        light *= kept.repeat(SAMPLES, axis=0).repeat(SAMPLES, axis=1).reshape(-1, 1)
+
+    def _paint_clear(self, light: FloatArray) -> None:
+        """Lay see-through surfaces over what is behind them, the farthest first."""
+        batches = [
+            batch[batch.nearness > self.nearness[batch.pixels]]
+            for batch in fragments(self.clear.screen, self.width, self.height)
+        ]
+        if not batches:
+            return
+        found = Fragments(*(np.concatenate([getattr(b, n) for b in batches]) for n in Fragments.__annotations__))
+        order = np.lexsort((found.nearness, found.pixels))
+        found = found[order]
+        shaded, facing = self._shaded(self.clear, found)
+        opacity = self.clear.colours[found.triangles, 3]
+        opacity = opacity + (1.0 - opacity) * 0.75 * (1.0 - np.clip(facing, 0.0, 1.0)) ** 3
+        first = np.flatnonzero(np.diff(found.pixels, prepend=-1))
+        rank = np.arange(len(found.pixels)) - np.repeat(first, np.diff(np.append(first, len(found.pixels))))
+        for layer in range(int(rank.max(initial=-1)) + 1):
+            rows = rank == layer
+            pixels, alpha = found.pixels[rows], opacity[rows, None]
+            light[pixels] = (1.0 - alpha) * light[pixels] + alpha * shaded[rows]
+
+    def _paint_marks(self, light: FloatArray) -> None:
+        """Let contact points and normals show through what hides them."""
+        found = nearest(self.marks.screen, self.width, self.height)
+        found = found[found.nearness < self.nearness[found.pixels] - 1e-6]
+        shaded = self._shaded(self.marks, found, shadows=False)[0]
+        alpha = self.marks.colours[found.triangles, 3:]
+        light[found.pixels] = (1.0 - alpha) * light[found.pixels] + alpha * shaded

@@ -1,0 +1,1 @@
+"""The scene of a grasp: bodies, camera, captions."""

@@ -1,0 +1,78 @@
+"""What is written beside the grasps: the same words in the picture, in the page and in the live view."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from graspatlas.paths.path import GraspPath
+from graspatlas.quality.evaluation import INDICES, quality_name
+from graspatlas.requirements.screening import requirement_name
+from graspatlas.result.result import Result
+from graspatlas.viewer.scene.scene import COLOURS, Colour, Exhibit
+
+__all__ = ["Caption", "caption", "film_title", "index_name", "legend", "subtitle"]
+
+#: Motions below this are rounding [mm per rad].
+ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class Caption:
+    """What is written beside one grasp.
+
+    Attributes:
+        title: Such as ``Best grasp``.
+        quality: The quality index in words, and its value.
+        motion: How far the object moves when the joints turn by one radian (root of the sum of squares): semi-axes.
+    """
+
+    title: str
+    quality: str
+    motion: str
+
+
+def caption(result: Result, exhibit: Exhibit) -> Caption:
+    """What is written beside one of the grasps."""
+    axes = [1000.0 * axis for axis in exhibit.semi_axes[: 3 if len(exhibit.grasp.G) == 6 else 2]]
+    reach = ", ".join(f"{axis if axis > ROUNDING else 0.0:.3g}" for axis in axes)
+    moves = max(axes) > ROUNDING
+    return Caption(
+        title=f"{exhibit.name.capitalize()} grasp",
+        quality=f"{index_name(result)} {exhibit.grasp.quality:.3g}",
+        motion=f"object moves {reach} mm per rad" if moves else "the joints do not move the object",
+    )
+
+
+def index_name(result: Result) -> str:
+    """Name of the quality index, in words."""
+    return quality_name(result.quality).replace("_", " ")
+
+
+def subtitle(result: Result) -> str:
+    """The problem, the size of its atlas, whether that is complete, and the unit."""
+    name = quality_name(result.quality)
+    known = name in INDICES and result.quality in (name, INDICES[name])
+    unit = "; lengths in mm" if known else ""
+    those = ""
+    if result.requirements:
+        names = ", ".join(requirement_name(r).split(":")[0].replace("_", " ") for r in result.requirements)
+        those = f"; {result.feasible.sum()} meet {names}"
+    return f"{result.problem.name}: atlas of {result.atlas.n_charts} charts, {result.status}{those}{unit}"
+
+
+def film_title(path: GraspPath) -> str:
+    """The problem, how long the path is, and whether it meets the requirements."""
+    those = ""
+    if path.result.requirements and path.knows_requirements:
+        met = int(path.feasible.sum())
+        those = "; all of them meet the requirements" if met == len(path) else f"; {met} of them meet the requirements"
+    return f"{path.result.problem.name}: path of length {path.length:.3g} through {len(path)} grasps{those}"
+
+
+def legend() -> list[tuple[Colour, str]]:
+    """Colours and what they stand for."""
+    return [
+        (COLOURS["contact"], "contact point"),
+        (COLOURS["normal"], "normal, out of the object"),
+        (COLOURS["ellipsoid"], "velocities that the joints give the object, not to a common scale"),
+    ]

@@ -1,0 +1,222 @@
+"""What the viewers show: the best grasp, the worst beside it, as coloured meshes, and where to look from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graspatlas.grasps.grasps import Grasp
+from graspatlas.result.result import Result
+from graspatlas.viewer.scene.bodies import BodyShapes
+from graspatlas.viewer.scene.camera import Camera
+from graspatlas.viewer.scene.meshes import Mesh, arrow, ellipsoid, merged
+from graspatlas.viewer.scene.velocity_ellipsoid import velocity_ellipsoid
+from graspatlas.viewer.scene.viewpoint import Subject, best_direction
+
+__all__ = [
+    "COLOURS",
+    "SHOW_THROUGH",
+    "Colour",
+    "Exhibit",
+    "Part",
+    "Scene",
+    "body_parts",
+    "direction_to",
+    "fitted_camera",
+    "grasp_parts",
+    "size_of",
+    "subject_of",
+    "vertices_of",
+]
+
+Array = NDArray[np.float64]
+#: Red, green, blue and opacity, each 0 to 1.
+Colour = tuple[float, float, float, float]
+
+#: Colours of what is drawn on top of hand and object: red, green, blue, opacity, each 0 to 1.
+COLOURS: dict[str, Colour] = {
+    "contact": (0.86, 0.03, 0.12, 1.0),
+    "normal": (1.0, 0.50, 0.0, 1.0),
+    "ellipsoid": (0.56, 0.20, 0.88, 0.24),
+}
+#: How much of them shows through what hides them.
+SHOW_THROUGH = {"contact": 0.9, "normal": 0.8, "ellipsoid": 0.22}
+#: Sizes of contact points and arrows, and the longest semi-axis that an ellipsoid is drawn with [m].
+CONTACT_RADIUS = 0.0042
+NORMAL_LENGTH = 0.042
+NORMAL_RADIUS = 0.0015
+ELLIPSOID_LENGTH = 0.05
+#: Flat ellipsoids are drawn this thick, to be seen at all [m].
+ELLIPSOID_THICKNESS = 0.0022
+#: Steps in which the camera is moved until both grasps fit.
+MAX_FRAMING_STEPS = 40
+#: Diagonal of the box round hand and object that all sizes here are meant for; others are scaled to it [m].
+USUAL_SIZE = 0.32
+#: From where planar problems are seen.
+FROM_ABOVE = np.array([0.0, -0.45, 1.0])
+#: Space between the two grasps [m].
+GAP = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One mesh of one colour.
+
+    Attributes:
+        group: ``hand``, ``object``, ``contact``, ``normal`` or ``ellipsoid``.
+        mesh: The mesh; the same one may stand in several parts.
+        T: Its placement [4, 4].
+        colour: Red, green, blue and opacity, each 0 to 1.
+    """
+
+    group: str
+    mesh: Mesh
+    T: Array
+    colour: Colour
+
+
+@dataclass(frozen=True, eq=False)
+class Exhibit:
+    """One grasp as it is shown.
+
+    Attributes:
+        name: ``best`` or ``worst``.
+        grasp: The grasp.
+        parts: Its meshes, placed in the world.
+        semi_axes: Semi-axes of the object's velocity ellipsoid, longest first [3], metres a radian.
+    """
+
+    name: str
+    grasp: Grasp
+    parts: tuple[Part, ...]
+    semi_axes: Array
+
+    @cached_property
+    def points(self) -> Array:
+        """Vertices of hand, object and normals: what must be in the picture [n, 3]."""
+        return vertices_of(list(self.parts), ("hand", "object", "normal"))
+
+
+class Scene:
+    """The best grasp on the left, the worst on the right, seen from one direction.
+
+    Args:
+        result: The result.
+        worst: Whether the worst grasp is shown.
+
+    Raises:
+        GraspAtlasError: If a mesh of the hand or the object cannot be read.
+    """
+
+    def __init__(self, result: Result, *, worst: bool = True) -> None:
+        self.result = result
+        shapes = BodyShapes(result.problem)
+        best = result.refined_best if result.refinement else result.best
+        grasps = [("best", best), ("worst", result.worst)][: 2 if worst else 1]
+        size = size_of(body_parts(shapes, best))
+        sides = [(name, grasp, *grasp_parts(shapes, grasp, size)) for name, grasp in grasps]
+        subjects = [subject_of(parts, grasp, size) for _, grasp, parts, _ in sides]
+        self.direction = direction_to(subjects, planar=len(result.best.G) < 6)
+        right = Camera(np.zeros(3), self.direction, 1.0).axes[0]
+        #: Best, then worst.
+        self.exhibits = tuple(
+            Exhibit(name, grasp, _side(parts, right, sign, size), semi_axes)
+            for (name, grasp, parts, semi_axes), sign in zip(sides, (-1.0, 1.0), strict=False)
+        )
+
+    def camera(self, aspect: float, window: tuple[float, float, float, float]) -> Camera:
+        """Camera that shows all grasps inside a window of its picture.
+
+        Args:
+            aspect: Width over height of the picture.
+            window: Left, right, bottom and top of the window; the picture spans -1 to 1 both ways.
+        """
+        points = np.concatenate([exhibit.points for exhibit in self.exhibits])
+        return fitted_camera(points, self.direction, aspect, window)
+
+
+def direction_to(subjects: list[Subject], *, planar: bool) -> Array:
+    """Unit vector [3] towards the camera: from above in the plane, else from where most is seen."""
+    return FROM_ABOVE / np.linalg.norm(FROM_ABOVE) if planar else best_direction(subjects)
+
+
+def fitted_camera(points: Array, direction: Array, aspect: float, window: tuple[float, float, float, float]) -> Camera:
+    """Camera that shows points [n, 3] from a direction [3] inside a window of its picture; see :meth:`Scene.camera`."""
+    low, high = np.array([window[0], window[2]]), np.array([window[1], window[3]])
+    camera = Camera(points.mean(axis=0), direction, 1.0)
+    for _ in range(MAX_FRAMING_STEPS):
+        seen = camera.project(points, aspect)[:, :2]
+        size = float((np.ptp(seen, axis=0) / (high - low)).max())
+        shift = (seen.min(axis=0) + seen.max(axis=0) - size * (low + high)) / 2.0
+        half = camera.distance * np.tan(camera.field_of_view / 2.0)
+        target = camera.target + half * (shift * [aspect, 1.0]) @ camera.axes[:2]
+        camera = Camera(target, direction, camera.distance * size)
+        if abs(size - 1.0) < 1e-8 and np.abs(shift).max() < 1e-8:
+            break
+    return camera
+
+
+def body_parts(shapes: BodyShapes, grasp: Grasp) -> list[Part]:
+    """Hand and object of a grasp, in the palm's frame."""
+    parts = [Part("hand", mesh, T, colour) for mesh, T, colour in shapes.hand(grasp.q)]
+    return parts + [Part("object", mesh, grasp.T_palm_object @ T, colour) for mesh, T, colour in shapes.object()]
+
+
+def grasp_parts(shapes: BodyShapes, grasp: Grasp, size: float = 1.0) -> tuple[list[Part], Array]:
+    """Everything that one grasp is drawn with, in the palm's frame.
+
+    Args:
+        shapes: Meshes of hand and object.
+        grasp: The grasp.
+        size: Scale of what is drawn on top of hand and object.
+
+    Returns:
+        The parts, and the semi-axes of the velocity ellipsoid, longest first [3], metres a radian.
+    """
+    parts = body_parts(shapes, grasp)
+    ball = ellipsoid(np.full(3, size * CONTACT_RADIUS), 24)
+    for point, normal in zip(grasp.contact_points, grasp.contact_normals, strict=True):
+        T = np.eye(4)
+        T[:3, 3] = point
+        parts.append(Part("contact", ball, T, COLOURS["contact"]))
+        needle = arrow(point, normal, size * NORMAL_LENGTH, size * NORMAL_RADIUS)
+        parts.append(Part("normal", needle, np.eye(4), COLOURS["normal"]))
+
+    axes, semi_axes = velocity_ellipsoid(grasp)
+    if semi_axes[0] > 0.0:
+        drawn = size * np.maximum(ELLIPSOID_LENGTH * semi_axes / semi_axes[0], ELLIPSOID_THICKNESS)
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = axes, grasp.object_xyz
+        parts.append(Part("ellipsoid", ellipsoid(drawn), T, COLOURS["ellipsoid"]))
+    return parts, semi_axes
+
+
+def vertices_of(parts: list[Part], groups: tuple[str, ...] = ("hand", "object")) -> Array:
+    """All vertices of parts of some groups [n, 3]."""
+    return np.concatenate([p.mesh.moved(p.T).vertices for p in parts if p.group in groups])
+
+
+def size_of(parts: list[Part]) -> float:
+    """Size of hand and object compared with that which the scene is made for; 1 when they are about alike."""
+    size = float(np.linalg.norm(np.ptp(vertices_of(parts), axis=0))) / USUAL_SIZE
+    return 1.0 if 0.6 < size < 1.6 else size
+
+
+def subject_of(parts: list[Part], grasp: Grasp, size: float) -> Subject:
+    """What the camera should see; the contacts stand for an object that has no shape."""
+    marks = [p for p in parts if p.group == "contact"]
+    groups = [[p for p in parts if p.group == group] or marks for group in ("hand", "object")]
+    T = np.diag([1.0 / size, 1.0 / size, 1.0 / size, 1.0])
+    hand, body = (merged([p.mesh.moved(T @ p.T) for p in group]) for group in groups)
+    return Subject.of(hand, body, grasp.contact_points / size)
+
+
+def _side(parts: list[Part], right: Array, sign: float, size: float) -> tuple[Part, ...]:
+    """Parts scaled to the usual size and moved along the picture's right axis, half a gap from its middle."""
+    reach = float((-sign * (vertices_of(parts) @ right)).max()) / size
+    T = np.diag([1.0 / size, 1.0 / size, 1.0 / size, 1.0])
+    T[:3, 3] = sign * (reach + GAP / 2.0) * right
+    return tuple(Part(p.group, p.mesh, T @ p.T, p.colour) for p in parts)

@@ -1,0 +1,135 @@
+"""A film as commands of the meshcat viewer, and as one page with a slider that needs neither server nor network."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterator
+from importlib import resources
+from string import Template
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from graspatlas.viewer.render.text_images import DARK, GREY, text_image
+from graspatlas.viewer.scene.animation import Film
+from graspatlas.viewer.scene.captions import film_title, index_name, legend
+from graspatlas.viewer.scene.scene import SHOW_THROUGH
+from graspatlas.viewer.web.page import (
+    ASPECT,
+    LETTERS,
+    ROOT,
+    THROUGH,
+    Command,
+    filled_page,
+    floor_shadow,
+    legend_rows,
+    png_bytes,
+    set_object,
+    studio,
+)
+from graspatlas.viewer.web.threejs import group, mesh, sprite
+
+__all__ = ["film_animation", "film_caption", "film_commands", "film_page"]
+
+Array = NDArray[np.float64]
+
+#: Where the grasps are in the page: left, right, bottom, top; each spans -1 to 1.
+WINDOW = (-0.85, 0.85, -0.62, 0.90)
+#: Time that playing takes [s]: so much for each unit of length, at least and at most.
+SECONDS_A_UNIT, LEAST_SECONDS, MOST_SECONDS = 3.0, 3.0, 15.0
+#: Height of the caption compared with that of the page.
+CAPTION_HEIGHT = 0.075
+
+
+def film_page(film: Film) -> str:
+    """The page's text."""
+    files = resources.files("graspatlas.viewer.web")
+    player = Template((files / "player.html").read_text(encoding="utf-8")).substitute(last=len(film) - 1)
+    script = (files / "player.js").read_text(encoding="utf-8").replace("$film", _data(film), 1)
+    name, rest = film_title(film.path).split(": ", 1)
+    rows = legend_rows(name, [rest], legend()[:2])
+    return filled_page(name, film_commands(film), rows, player, script)
+
+
+def _data(film: Film) -> str:
+    """What the player needs, as JSON that may stand inside a script."""
+    path, moving = film.path, np.flatnonzero(film.moving)
+    rows = film.T[:, moving, :3, :].transpose(0, 1, 3, 2).astype(np.float32)
+    data: dict[str, Any] = {
+        "paths": [_place(int(i)) for i in moving],
+        "placements": base64.b64encode(np.ascontiguousarray(rows).tobytes()).decode("ascii"),
+        "points": film.points.tolist(),
+        "arc_lengths": path.arc_length[film.points].tolist(),
+        "seconds": _seconds(film),
+        "index": index_name(path.result),
+    }
+    if path.knows_quality:
+        data["qualities"] = path.qualities[film.points].tolist()
+    if path.result.requirements and path.knows_requirements:
+        data["feasible"] = path.feasible[film.points].tolist()
+    return json.dumps(data).replace("<", "\\u003c")
+
+
+def _place(part: int) -> str:
+    """Path of a part in meshcat's tree."""
+    return f"{ROOT}/part_{part}"
+
+
+def _seconds(film: Film) -> float:
+    return float(np.clip(SECONDS_A_UNIT * film.path.length, LEAST_SECONDS, MOST_SECONDS))
+
+
+def film_commands(film: Film) -> Iterator[Command]:
+    """Commands that make meshcat show the first frame, each part at a place of its own."""
+    camera = film.camera(ASPECT, WINDOW)
+    yield from studio(camera)
+    centred = np.eye(4)
+    centred[:3, 3] = -camera.target
+    yield {"type": "set_transform", "path": ROOT, "matrix": centred.T.ravel().tolist()}
+    for i, part in enumerate(film.parts):
+        members = [mesh(part.mesh, np.eye(4), part.colour)]
+        if part.group in SHOW_THROUGH:
+            members.append(mesh(part.mesh, np.eye(4), part.colour, through=THROUGH * SHOW_THROUGH[part.group]))
+        yield set_object(_place(i), group(members))
+        yield {"type": "set_transform", "path": _place(i), "matrix": part.T.T.ravel().tolist()}
+    yield set_object(f"{ROOT}/floor", floor_shadow(film.frame(len(film) // 2)))
+
+
+def film_caption(film: Film) -> Command:
+    """What the path is, below it; for a view that has no foot."""
+    camera = film.camera(ASPECT, WINDOW)
+    name, rest = film_title(film.path).split(": ", 1)
+    rest += "; the controls, top right, play it"
+    image = text_image([(name, LETTERS, DARK), (rest, 0.6 * LETTERS, GREY)])
+    visible = 2.0 * camera.distance * np.tan(camera.field_of_view / 2.0)
+    height = CAPTION_HEIGHT * visible
+    place = camera.target - 0.44 * visible * camera.axes[1]
+    return set_object(f"{ROOT}/caption", sprite(png_bytes(image), place, height * image.width / image.height, height))
+
+
+def film_animation(film: Film) -> Command:
+    """Command that gives meshcat's controls a slider, and buttons to play and pause."""
+    times = np.linspace(0.0, _seconds(film), len(film))
+    rate = (len(film) - 1) / _seconds(film) if len(film) > 1 else 1.0
+    animations = []
+    for i in np.flatnonzero(film.moving):
+        T = film.T[:, i]
+        scale = np.linalg.norm(T[:, :3, 0], axis=1)[:, None, None]
+        tracks = {
+            ".position": ("vector3", T[:, :3, 3]),
+            ".quaternion": ("quaternion", Rotation.from_matrix(T[:, :3, :3] / scale).as_quat()),
+        }
+        keys = [
+            {
+                "name": name,
+                "type": kind,
+                "keys": [{"time": float(rate * t), "value": v.tolist()} for t, v in zip(times, values, strict=True)],
+            }
+            for name, (kind, values) in tracks.items()
+        ]
+        animations.append({"path": _place(int(i)), "clip": {"fps": rate, "name": "path", "tracks": keys}})
+    options = {"play": True, "repetitions": 1}
+    return {"type": "set_animation", "animations": animations, "options": options, "path": ""}
