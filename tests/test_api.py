@@ -15,10 +15,11 @@ import graspatlas as ga
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+PACKAGES = ("atlas", "grasps", "hand", "optimizer", "paths", "problem", "requirements", "result", "search", "sweep")
 MODULES = [
-    ga, ga.motions, ga.patches, ga.quality, ga.systems,
-    *(__import__(f"graspatlas.{name}", fromlist=["x"]) for name in ("atlas", "grasps", "hand", "optimizer", "paths", "problem", "requirements", "result", "search", "sweep")),
-]  # fmt: skip
+    *(ga, ga.motions, ga.patches, ga.quality, ga.systems),
+    *(__import__(f"graspatlas.{name}", fromlist=["x"]) for name in PACKAGES),
+]
 
 
 @pytest.mark.parametrize("module", MODULES, ids=lambda m: m.__name__)

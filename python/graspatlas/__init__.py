@@ -11,13 +11,14 @@ from graspatlas.analysis.densify import Samples, densify
 from graspatlas.analysis.pareto import pareto_front
 from graspatlas.analysis.refine import refine
 from graspatlas.atlas.atlas import Atlas, Closed, Status
+from graspatlas.atlas.build import build_atlas
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasp, Grasps
 from graspatlas.hand import motions
 from graspatlas.hand.hand import Body, Hand
 from graspatlas.hand.motions import HandMotions
 from graspatlas.optimizer.components import Components, SearchStatus, find_components
-from graspatlas.optimizer.optimize import build_atlas, optimize
+from graspatlas.optimizer.optimize import optimize
 from graspatlas.paths.path import GraspPath, Path
 from graspatlas.paths.shortest_path import shortest_path
 from graspatlas.problem.contacts import Contact

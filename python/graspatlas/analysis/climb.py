@@ -28,8 +28,8 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.quality.evaluation import Quality, evaluate
 from graspatlas.requirements.screening import Require, Requirement, screen
-from graspatlas.search.find_grasps import deadline_after
-from graspatlas.support.validation import number_array, shown
+from graspatlas.support.deadlines import deadline_after
+from graspatlas.support.validation import number_array, shown, whole
 
 if TYPE_CHECKING:
     from graspatlas.problem.problem import Problem
@@ -160,8 +160,7 @@ def climb(
     """
     if not hasattr(result, "atlas"):
         raise GraspAtlasError(f"result must be what graspatlas.optimize returned, got {type(result).__name__}")
-    if isinstance(max_steps, bool) or not isinstance(max_steps, int | np.integer) or max_steps < 1:
-        raise GraspAtlasError(f"max_steps must be a whole number of at least 1, got {max_steps!r}")
+    whole(max_steps, "max_steps")
     deadline = deadline_after(max_seconds)
     hill = _Hill.of(result, all_motions)
     chart, x = _start(result, start)

@@ -18,16 +18,13 @@ farther apart. Each chart's lattice contains its origin: the charts' centres are
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from tqdm import tqdm
 
 from graspatlas import _core
 from graspatlas.atlas.atlas import Atlas, shortest_way
@@ -37,6 +34,8 @@ from graspatlas.quality.evaluation import evaluate
 from graspatlas.requirements.screening import screen
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.pickling import Light
+from graspatlas.support.progress import progress_bar
+from graspatlas.support.validation import positive
 
 if TYPE_CHECKING:
     from graspatlas.problem.problem import Problem
@@ -148,7 +147,7 @@ def densify(result: Result, spacing: float, *, share: float = 1.0, progress: boo
 
     Source: "Global Optimization of Robotic Grasps", end of Section IV.
     """
-    _positive("share", share, 1.0)
+    positive(share, "share", most=1.0)
     unknown = [r for r in result.requirements if isinstance(r, str)]
     if unknown:
         raise GraspAtlasError(
@@ -265,7 +264,7 @@ def _last(high: Array, spacing: float) -> Array:
 
 def _checked(atlas: Atlas, spacing: float, charts: Sequence[int] | ArrayLike | None) -> IntArray:
     """The charts to fill, when the spacing makes sense for them."""
-    _positive("spacing", spacing)
+    positive(spacing, "spacing")
     chosen = np.unique(np.arange(atlas.n_charts) if charts is None else np.asarray(charts))
     if len(chosen) == 0:
         return np.zeros(0, np.int64)
@@ -292,27 +291,12 @@ def _spacing_that_fits(atlas: Atlas, spacing: float, charts: IntArray) -> float 
     return float(np.ceil(10.0**high / digit) * digit)
 
 
-def _positive(name: str, value: float, most: float = np.inf) -> None:
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < float(value) <= most or np.isinf(value):
-        kind = "a positive number" if np.isinf(most) else f"above 0 and at most {most:g}"
-        raise GraspAtlasError(f"{name} must be {kind}, got {value!r}")
-
-
 def _blocks(
     atlas: Atlas, spacing: float, charts: Sequence[int] | ArrayLike | None, progress: bool | None
 ) -> Generator[Grid]:
     """The grid in pieces of about `BLOCK` points, with a progress bar over the charts."""
     chosen = _checked(atlas, spacing, charts)
-    shown = sys.stderr.isatty() if progress is None else progress
-    bar = tqdm(
-        total=len(chosen),
-        desc=f"up to {most_samples(atlas, spacing, chosen):,.0f} samples",
-        unit=" charts",
-        disable=not shown,
-        delay=QUIET_SECONDS,
-        file=sys.stderr,
-        mininterval=0.1 if sys.stderr.isatty() else 10.0,  # in a file a line every ten seconds is enough
-    )
+    bar = progress_bar(f"up to {most_samples(atlas, spacing, chosen):,.0f} samples", "charts", len(chosen), progress)
     low, high = _boxes(atlas)
     with bar:
         block = _Block(atlas)

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from graspatlas.analysis.climb import MAX_STEPS, Climb, Peak, climb, local_maxima, peaks_of
 from graspatlas.errors import GraspAtlasError
 from graspatlas.result.refinement import Refinement
-from graspatlas.search.find_grasps import deadline_after
+from graspatlas.support.deadlines import deadline_after
 from graspatlas.support.interrupts import held, stoppable, stopping
+from graspatlas.support.progress import progress_bar
 
 if TYPE_CHECKING:
     from graspatlas.result.result import Result
@@ -26,8 +25,6 @@ Array = NDArray[np.float64]
 
 #: Local maxima of the atlas from which to climb, the best first.
 MOST_STARTS = 40
-#: Climbing that ends within this shows no progress bar [s].
-QUIET_SECONDS = 1.0
 
 
 @stoppable()
@@ -66,15 +63,7 @@ def refine(
     charts = local_maxima(result)[:MOST_STARTS]
     if len(charts) == 0:
         raise GraspAtlasError("no grasp meets the requirements, so there is none to refine: relax one")
-    shown = sys.stderr.isatty() if progress is None else progress
-    bar = tqdm(
-        total=len(charts),
-        desc="refine",
-        unit=" climbs",
-        disable=not shown,
-        delay=QUIET_SECONDS,
-        file=sys.stderr,
-    )
+    bar = progress_bar("refine", "climbs", len(charts), progress)
     ends: list[Climb] = []
     starts = np.asarray(charts)
     complete = True

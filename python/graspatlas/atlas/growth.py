@@ -2,55 +2,33 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from graspatlas import _core
 from graspatlas.atlas.atlas import Status
 from graspatlas.atlas.checkpoints import CheckpointFolder
+from graspatlas.atlas.limits import Limits
 from graspatlas.errors import GraspAtlasError
 from graspatlas.support.interrupts import hear, held, stopping
+from graspatlas.support.progress import QUIET_SECONDS, is_shown, progress_bar
 from graspatlas.systems.system import AnySystem
 
-__all__ = ["Growth", "Limits", "available_bytes", "available_threads", "outlook"]
+__all__ = ["Growth", "outlook"]
 
 _SLICE_SECONDS = 0.1
 #: Work that a killed run can lose [s], but for the time that writing takes.
 _CHECKPOINT_SECONDS = 20.0
-_QUIET_SECONDS = 1.0  # work that ends within this shows no progress bar
 #: A coarse atlas that tells the size of the one being grown has this part of its charts, about.
 _COARSE_SHARE = 1 / 30
-#: Share of the free memory that an atlas may take.
-_MEMORY_SHARE = 0.8
 
 
 #: Points of random walks that an audit looks up: at least, and as a share of the charts.
 AUDIT_POINTS, AUDIT_SHARE = 300, 1 / 20
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Where an atlas is cut short.
-
-    Attributes:
-        charts: Number of charts.
-        deadline: Time by ``time.perf_counter`` [s].
-        memory: Of the atlas with the arrays made of it [bytes].
-        seconds_each: Time that is to be left for each chart at the deadline, to read it [s].
-    """
-
-    charts: int
-    deadline: float
-    memory: float
-    seconds_each: float = 0.0
 
 
 class Growth:
@@ -97,18 +75,8 @@ class Growth:
         return status
 
     def _run(self, limits: Limits, progress: bool | None, after_slice: Callable[[], None]) -> Status:
-        shown = sys.stderr.isatty() if progress is None else progress
-        # In a file a line every ten seconds is enough.
-        interval = 0.1 if sys.stderr.isatty() else 10.0
-        bar = tqdm(
-            desc="atlas",
-            unit=" charts",
-            disable=not shown,
-            delay=_QUIET_SECONDS,
-            file=sys.stderr,
-            initial=self.builder.n_charts,
-            mininterval=interval,
-        )
+        shown = is_shown(progress)
+        bar = progress_bar("atlas", "charts", progress=progress, initial=self.builder.n_charts)
         builder, start = self.builder, time.perf_counter()
         try:
             while not builder.audited:
@@ -129,7 +97,7 @@ class Growth:
                     self.audit_seconds += time.perf_counter() - began
                 else:
                     builder.expand(limits.charts, seconds)
-                if shown and now - start > _QUIET_SECONDS:
+                if shown and now - start > QUIET_SECONDS:
                     size = self.expected_size(seconds)
                     bar.set_postfix_str(outlook(builder, size, time.perf_counter() - start), refresh=False)
                 bar.update(builder.n_charts - bar.n)
@@ -166,35 +134,3 @@ def outlook(builder: _core.AtlasBuilder, size: int | None, seconds: float) -> st
         return text
     left = seconds * (size - builder.n_charts) / builder.n_charts
     return f"{text}; about {float(f'{size:.2g}'):,.0f} charts in all, {left:.0f} s left"
-
-
-def available_threads() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def available_bytes() -> float:
-    """Memory that an atlas may take: a share of what the machine, or the container, has free; inf if unknown."""
-    free = [size for size in (_free_in_machine(), _free_in_container()) if size is not None]
-    return _MEMORY_SHARE * min(free) if free else float("inf")
-
-
-def _free_in_machine() -> float | None:
-    try:
-        for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
-            if line.startswith("MemAvailable:"):
-                return 1024.0 * float(line.split()[1])
-    except OSError:
-        pass
-    return None
-
-
-def _free_in_container() -> float | None:
-    folder = Path("/sys/fs/cgroup")
-    try:
-        limit = float((folder / "memory.max").read_text(encoding="ascii"))  # "max" where there is none
-        return limit - float((folder / "memory.current").read_text(encoding="ascii"))
-    except (OSError, ValueError):
-        return None

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from graspatlas.atlas.atlas import Status
+from graspatlas.atlas.build import build_atlas
 from graspatlas.errors import GraspAtlasError
-from graspatlas.optimizer.optimize import build_atlas
 from graspatlas.problem.problem import Problem
 from graspatlas.requirements.collision import CollisionChecker
 from graspatlas.requirements.hulls import LARGEST_ERROR

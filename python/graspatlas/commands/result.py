@@ -19,8 +19,8 @@ from graspatlas.paths.path import GraspPath
 from graspatlas.paths.shortest_path import shortest_path
 from graspatlas.paths.time_parametrization import speed_limits
 from graspatlas.quality.evaluation import quality_name
-from graspatlas.result.data_frames import FRAME_ENDINGS, save_frame
 from graspatlas.result.result import Result, load_result
+from graspatlas.support.columns import FRAME_ENDINGS, save_frame
 from graspatlas.support.files import replaced, writable_folder
 from graspatlas.support.terminal import say
 from graspatlas.support.validation import shown

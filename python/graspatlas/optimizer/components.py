@@ -9,25 +9,27 @@ it.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import Unpack
 
-from graspatlas.analysis.climb import MAX_STEPS
 from graspatlas.atlas.atlas import Atlas, Status
+from graspatlas.atlas.limits import check_keywords
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasp
-from graspatlas.optimizer.optimize import optimize, options_of
+from graspatlas.optimizer.optimize import optimize
+from graspatlas.optimizer.options import OptimizeOptions, with_defaults
 from graspatlas.problem.problem import Problem
-from graspatlas.quality.evaluation import Quality
-from graspatlas.requirements.screening import Require
 from graspatlas.result.result import Result
-from graspatlas.search.find_grasps import MAX_SPECIAL, GraspSearch, deadline_after, search_bar
+from graspatlas.search.find_grasps import MAX_SPECIAL, GraspSearch
+from graspatlas.support.deadlines import deadline_after
 from graspatlas.support.interrupts import stoppable
+from graspatlas.support.progress import progress_bar
+from graspatlas.support.validation import whole
 
 __all__ = ["Components", "SearchStatus", "find_components"]
 
@@ -137,19 +139,10 @@ class Components:
 def find_components(
     problem: Problem,
     *,
-    dimension: int | None = None,
-    radius: float | None = None,
-    epsilon: float | None = None,
-    quality: Quality | Sequence[Quality] | None = None,
-    require: Sequence[Require] | None = None,
-    refine: bool | str = False,
-    refine_steps: int = MAX_STEPS,
-    max_charts: int | None = None,
-    max_seconds: float | None = None,
-    threads: int | None = None,
     covered: int = 300,
     seed: int = 0,
     progress: bool | None = None,
+    **options: Unpack[OptimizeOptions],
 ) -> Components:
     """Find the best grasp over all connected components of the relevant grasps that a random search finds.
 
@@ -157,20 +150,13 @@ def find_components(
 
     Args:
         problem: The problem, with or without x1.
-        dimension: k, of the set of relevant grasps: 1 to t.
-        radius: r, of a chart: see :func:`graspatlas.optimize`; this and what follows hold for every component.
-        epsilon: See :func:`graspatlas.build_atlas`.
-        quality: Name of an index, or a callable; of several the first chooses.
-        require: What a grasp must meet to be the best or the worst; the problem's requirements by default.
-        refine: Refine the best of each component; see :func:`graspatlas.optimize`.
-        refine_steps: See :func:`graspatlas.optimize`.
-        max_charts: Number of charts after which the atlas of a component is cut short; none by default.
-        max_seconds: Time after which the search ends; none by default. An atlas that is growing then is cut short.
-        threads: See :func:`graspatlas.build_atlas`.
         covered: The search ends when as many grasps in a row were covered: by default 300, after which components not
             found yet get at most 1 % of the finds with 95 % confidence.
         seed: Of the random numbers.
         progress: Show a progress bar on standard error; by default when it is a terminal.
+        **options: What :func:`graspatlas.optimize` is told for every component: ``dimension``, ``radius``, ``epsilon``,
+            ``quality``, ``require``, ``refine``, ``refine_steps``, ``max_charts``, ``max_bytes`` and ``threads``; and
+            ``max_seconds``, time after which the search ends: an atlas that is growing then is cut short.
 
     Returns:
         The components found, at least one.
@@ -180,15 +166,18 @@ def find_components(
 
     Source: "Global Optimization of Robotic Grasps", Section VI, where it is future work.
     """
-    if isinstance(covered, bool) or not isinstance(covered, int | np.integer) or covered < 1:
-        raise GraspAtlasError(f"covered must be a whole number of at least 1, got {covered!r}")
-    given = {"dimension": dimension, "radius": radius, "epsilon": epsilon, "quality": quality}
-    options = options_of(problem, given)
-    options |= {"require": require, "refine": refine, "refine_steps": refine_steps}
-    options |= {"max_charts": max_charts, "threads": threads}
-    traced = _Tracer(options, deadline_after(max_seconds), progress)
+    whole(covered, "covered")
+    check_keywords(options, OptimizeOptions.__annotations__, "find_components")
+    chosen = with_defaults(
+        problem,
+        dimension=options.get("dimension"),
+        radius=options.get("radius"),
+        epsilon=options.get("epsilon"),
+        quality=options.get("quality"),
+    )
+    traced = _Tracer({**options, **chosen}, deadline_after(options.get("max_seconds")), progress)
     start = time.perf_counter()
-    search = GraspSearch(problem, options["dimension"], seed)
+    search = GraspSearch(problem, chosen["dimension"], seed)
     try:
         status = _trace_all(problem, search, traced, covered, progress)
     except KeyboardInterrupt:
@@ -216,7 +205,7 @@ def _trace_all(
     """Find grasps and trace their components until enough in a row were covered."""
     if problem.x1 is not None:
         traced.trace(problem)
-    with search_bar("tries", progress) as bar:
+    with progress_bar("tries", progress=progress) as bar:
         while traced.covered < covered:
             if traced.interrupted:
                 return SearchStatus.INTERRUPTED
@@ -235,7 +224,7 @@ def _trace_all(
 class _Tracer:
     """The components so far, and what has been found in them."""
 
-    def __init__(self, options: dict[str, Any], deadline: float, progress: bool | None) -> None:
+    def __init__(self, options: OptimizeOptions, deadline: float, progress: bool | None) -> None:
         self.options, self.deadline, self.progress = options, deadline, progress
         self.results: list[Result] = []
         self.hits: list[int] = []
@@ -264,7 +253,8 @@ class _Tracer:
         """Trace the component of a problem's x1; its number."""
         left = self.deadline - time.perf_counter()
         seconds = None if np.isinf(left) else max(left, 1e-3)
-        new = optimize(problem, **self.options, max_seconds=seconds, progress=self.progress)
+        options: OptimizeOptions = {**self.options, "max_seconds": seconds}
+        new = optimize(problem, **options, progress=self.progress)
         self.interrupted = new.status is Status.INTERRUPTED
         for i, old in enumerate(self.results):
             if _same_component(new.atlas, old.atlas):

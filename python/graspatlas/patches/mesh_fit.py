@@ -17,6 +17,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.patches.base import Array, Vector3, checked_length, checked_vector, placement
 from graspatlas.patches.spline import BSpline, clamped_knots
 from graspatlas.support.files import is_file
+from graspatlas.support.validation import whole
 
 __all__ = ["FitReport", "patch_from_mesh"]
 
@@ -96,8 +97,7 @@ def patch_from_mesh(
     """
     half = checked_length(size, "size")
     checked_length(tolerance, "tolerance")
-    if isinstance(control_points, bool) or not isinstance(control_points, int) or not 4 <= control_points <= SAMPLES:
-        raise GraspAtlasError(f"control_points must be a whole number from 4 to {SAMPLES}, got {control_points!r}")
+    whole(control_points, "control_points", 4, SAMPLES)
     at, u_hint = checked_vector(center, "center"), checked_vector(u_axis, "u_axis", unit=True)
     corners, faces = _loaded(mesh)
     nearest, origin, axes = _tangent_frame(corners[faces], np.array(at), half, u_hint)

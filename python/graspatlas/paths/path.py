@@ -24,9 +24,9 @@ from graspatlas.grasps.grasps import Grasps
 from graspatlas.paths.time_parametrization import URDF, passing_times
 from graspatlas.quality.evaluation import INDICES, evaluate
 from graspatlas.result.result import Result
+from graspatlas.support.columns import joined, pose_columns
 from graspatlas.support.files import write_csv
 from graspatlas.support.pickling import Light
-from graspatlas.support.validation import joined, pose_columns
 
 __all__ = ["GraspPath", "Path"]
 

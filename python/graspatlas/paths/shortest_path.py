@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from itertools import pairwise
-from numbers import Integral, Real
+from numbers import Integral
 from typing import overload
 
 import numpy as np
@@ -23,7 +23,7 @@ from graspatlas.grasps.grasps import Grasp
 from graspatlas.paths.path import GraspPath, Path
 from graspatlas.result.result import Result
 from graspatlas.support.interrupts import stoppable
-from graspatlas.support.validation import number_array
+from graspatlas.support.validation import number_array, positive
 from graspatlas.systems.geodesic import BOUND_TOLERANCE, Allowed, arc_lengths, bridge, evenly, shorten
 
 __all__ = ["shortest_path"]
@@ -132,9 +132,7 @@ def shortest_path(
 def _step(atlas: Atlas, step: float | None) -> float:
     if step is None:
         return STEP * atlas.radius
-    if isinstance(step, bool) or not isinstance(step, Real) or not 0.0 < float(step) <= atlas.radius:
-        raise GraspAtlasError(f"step must be positive and at most the chart radius, {atlas.radius:g}; got {step!r}")
-    return float(step)
+    return positive(step, "step", most=atlas.radius)
 
 
 def _tightened(atlas: Atlas, X: Array, step: float, allowed: Allowed | None, shown: bool) -> tuple[Array, bool]:

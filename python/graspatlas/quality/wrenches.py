@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
-from graspatlas.support.validation import number, number_array
+from graspatlas.support.validation import number, number_array, whole
 
 __all__ = ["ball_radius", "contact_axes", "contact_wrenches", "hull_volume", "min_weight", "round_ball_radius"]
 
@@ -107,8 +107,7 @@ def contact_wrenches(
         GraspAtlasError: If an argument is out of its range or of another shape.
     """
     mu = checked_positive(friction, "friction")
-    if isinstance(edges, bool) or not isinstance(edges, int | np.integer) or edges < MIN_EDGES:
-        raise GraspAtlasError(f"edges must be a whole number of at least {MIN_EDGES}, got {edges!r}")
+    whole(edges, "edges", MIN_EDGES)
     axes = contact_axes(points, normals, length_unit, planar)
     if planar:
         corners = np.array([[1.0, mu], [1.0, -mu]])

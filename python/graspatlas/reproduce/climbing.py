@@ -6,15 +6,14 @@ of: those must find the contacts first, as :mod:`graspatlas.reproduce.box_starts
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 
 import numpy as np
-from tqdm import tqdm
 
 from graspatlas.analysis.climb import Climb, climb, peaks_of
 from graspatlas.reproduce.report import Number
 from graspatlas.result.result import Result
+from graspatlas.support.progress import counted
 
 __all__ = ["MAX_STEPS", "SEED", "STARTS", "Study", "study"]
 
@@ -120,8 +119,7 @@ def study(result: Result, label: str, *, progress: bool = True) -> Study:
     charts = result.candidates()
     count = min(STARTS, len(charts))
     starts = np.random.default_rng(SEED).choice(charts, count, replace=False)
-    bar = tqdm(starts, desc=label, unit=" climbs", disable=not progress, file=sys.stderr, leave=False)
-    climbs = [climb(result, int(chart), max_steps=MAX_STEPS) for chart in bar]
+    climbs = [climb(result, int(chart), max_steps=MAX_STEPS) for chart in counted(starts, label, "climbs", progress)]
     from_best = climb(result, result.best.chart, max_steps=MAX_STEPS)
     peaks = peaks_of(result, [*climbs, from_best])
     home = next(peak for peak in peaks if count in peak.climbs)

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 
 from graspatlas.atlas.atlas import Status
-from graspatlas.optimizer.optimize import build_atlas
+from graspatlas.atlas.build import build_atlas
 from graspatlas.reproduce.climbing import MAX_STEPS, Study, study
 from graspatlas.reproduce.findings import (
     add_box_starts,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -10,12 +9,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from tqdm import tqdm
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.mesh_files import check_meshes
 from graspatlas.requirements.collision_shapes import Shape, convex_hull, convex_solid, read_shapes, thinner
+from graspatlas.support.progress import progress_bar
 
 if TYPE_CHECKING:
     from graspatlas.hand.hand import Body
@@ -108,8 +107,7 @@ class CollisionChecker:
         """
         rows = self._rows(X)
         out = np.empty(len(rows), bool)
-        bar = tqdm(total=len(rows), desc="collisions", unit=" grasps", delay=1.0, disable=not sys.stderr.isatty())
-        with bar:
+        with progress_bar("collisions", "grasps", len(rows)) as bar:
             for start in range(0, len(rows), BATCH):
                 batch = rows[start : start + BATCH]
                 out[start : start + BATCH] = self._core.free(batch)

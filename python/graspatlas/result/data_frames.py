@@ -2,36 +2,30 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graspatlas.atlas.atlas import Atlas, Closed
-from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.problem.contacts import Contact
 from graspatlas.quality.evaluation import quality_name
 from graspatlas.result.exports import grasp_columns
-from graspatlas.support.files import replaced, write_csv
-from graspatlas.support.validation import joined
+from graspatlas.support.columns import joined, to_frame
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
     from graspatlas.result.result import Result
 
-__all__ = ["FRAME_ENDINGS", "atlas_frame", "neighbour_frame", "result_frame", "save_frame"]
-
-#: What a file of a table of charts may end in.
-FRAME_ENDINGS = (".csv", ".parquet")
+__all__ = ["atlas_frame", "neighbour_frame", "result_frame"]
 
 
 def atlas_frame(atlas: Atlas, volumes: bool) -> DataFrame:
     """One row a chart; see :meth:`Atlas.to_pandas`."""
     centers = {f"x{i}": column for i, column in enumerate(atlas.centers.T)}
-    return _frame(joined(centers, _chart_columns(atlas, volumes)))
+    return to_frame(joined(centers, _chart_columns(atlas, volumes)))
 
 
 def neighbour_frame(atlas: Atlas) -> DataFrame:
@@ -39,13 +33,13 @@ def neighbour_frame(atlas: Atlas) -> DataFrame:
     pairs, x, difference = atlas.neighbour_pairs, atlas.centers, atlas.system.difference
     distances = [float(np.linalg.norm(difference(x[a], x[b]))) for a, b in pairs]
     columns = {"chart": pairs[:, 0], "neighbour": pairs[:, 1], "distance": np.array(distances)}
-    return _frame(columns, index=None)
+    return to_frame(columns, index=None)
 
 
 def result_frame(result: Result, volumes: bool) -> DataFrame:
     """One row a chart; see :meth:`graspatlas.Result.to_pandas`."""
     grasps = Grasps(result.problem, result.atlas.centers)
-    return _frame(
+    return to_frame(
         joined(
             {"feasible": result.feasible},
             {quality_name(result.quality): result.qualities, **result.others},
@@ -54,41 +48,6 @@ def result_frame(result: Result, volumes: bool) -> DataFrame:
             _chart_columns(result.atlas, volumes),
         )
     )
-
-
-def save_frame(frame: DataFrame, path: Path) -> None:
-    """Write a table as CSV or Parquet; an existing file is replaced at once or not.
-
-    Args:
-        frame: The table; its index becomes the first column.
-        path: Ends in one of ``FRAME_ENDINGS``.
-
-    Raises:
-        GraspAtlasError: If the file cannot be written, or for Parquet pyarrow is not installed.
-    """
-    columns = {str(name): column.to_numpy() for name, column in frame.reset_index().items()}
-    if path.suffix == ".csv":
-        write_csv(path, columns)
-        return
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError:
-        raise GraspAtlasError(
-            f"'{path}' needs pyarrow: pip install 'graspatlas[sweep]'; or choose a file that ends in .csv"
-        ) from None
-    with replaced(path) as stream:
-        pq.write_table(pa.table(columns), stream)
-
-
-def _frame(columns: dict[str, Any], index: str | None = "chart") -> DataFrame:
-    try:
-        import pandas as pd
-    except ImportError:
-        raise GraspAtlasError("a table of charts needs pandas: pip install 'graspatlas[tables]'") from None
-    frame: DataFrame = pd.DataFrame(columns)
-    frame.index.name = index
-    return frame
 
 
 def _chart_columns(atlas: Atlas, volumes: bool) -> dict[str, NDArray[Any]]:

@@ -19,8 +19,9 @@ from graspatlas.grasps.grasps import Grasps
 from graspatlas.hand.urdf import root_link
 from graspatlas.quality.evaluation import INDICES, evaluate, quality_name
 from graspatlas.requirements.screening import requirement_name
+from graspatlas.support.columns import joined, pose_columns
 from graspatlas.support.files import replaced, write_csv
-from graspatlas.support.validation import joined, pose_columns, shown
+from graspatlas.support.validation import whole
 
 if TYPE_CHECKING:
     from graspatlas.result.result import Result
@@ -123,8 +124,7 @@ def select(
 
 def _best(result: Result, count: int) -> NDArray[np.int64]:
     """The best charts that meet the requirements, the best first; of equals the first."""
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-        raise GraspAtlasError(f"best must be a whole number of at least 1, got {shown(count)}")
+    whole(count, "best")
     candidates = result.candidates()
     order = np.argsort(-result.qualities[candidates], kind="stable")
     return np.asarray(candidates[order[:count]], np.int64)

@@ -10,7 +10,6 @@ from __future__ import annotations
 import sys
 import time
 from dataclasses import replace
-from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,10 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.problem import Problem
 from graspatlas.search.random_starts import Starts
 from graspatlas.search.starts_near_guess import starts_near
+from graspatlas.support.deadlines import deadline_after
 from graspatlas.support.interrupts import stoppable
+from graspatlas.support.progress import progress_bar
+from graspatlas.support.validation import whole
 from graspatlas.systems.projection import project
 
 __all__ = ["MAX_TRIES", "GraspSearch", "find_grasps", "with_first_grasp"]
@@ -70,15 +72,14 @@ def find_grasps(
     Raises:
         GraspAtlasError: If an argument makes no sense.
     """
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-        raise GraspAtlasError(f"count must be a whole number of at least 1, got {count!r}")
+    whole(count, "count")
     if not isinstance(problem, Problem):
         raise GraspAtlasError(f"problem must be a graspatlas.Problem, got {type(problem).__name__}; see load_problem")
     search = GraspSearch(problem, problem.largest_dimension if dimension is None else dimension, seed)
     deadline, last_new = deadline_after(max_seconds), 0
     found: list[Array] = []
     places: list[Array] = []
-    with search_bar("tries", progress) as bar:
+    with progress_bar("tries", progress=progress) as bar:
         try:
             while len(found) < count:
                 x = search.next_grasp(deadline, bar)
@@ -107,31 +108,11 @@ def with_first_grasp(
     if problem.x1 is not None:
         return problem
     search = GraspSearch(problem, dimension, seed=0)
-    with search_bar("tries at a first grasp", progress) as bar:
+    with progress_bar("tries at a first grasp", progress=progress) as bar:
         x = search.next_start(deadline_after(max_seconds), bar)
     if x is None:
         raise search.failure()
     return search.problem.at(x)
-
-
-def deadline_after(max_seconds: float | None) -> float:
-    """Reading of ``time.perf_counter`` after so many seconds [s]; infinite for None.
-
-    Raises:
-        GraspAtlasError: If the seconds are no positive number.
-    """
-    if max_seconds is None:
-        return float("inf")
-    if isinstance(max_seconds, bool) or not isinstance(max_seconds, Real) or not float(max_seconds) > 0.0:
-        raise GraspAtlasError(f"max_seconds must be a positive number, got {max_seconds!r}")
-    return time.perf_counter() + float(max_seconds)
-
-
-def search_bar(what: str, progress: bool | None) -> tqdm[None]:
-    """A progress bar on standard error that shows itself after a second."""
-    shown = sys.stderr.isatty() if progress is None else progress
-    interval = 0.1 if sys.stderr.isatty() else 10.0
-    return tqdm(desc=what, disable=not shown, delay=1.0, file=sys.stderr, mininterval=interval)
 
 
 class GraspSearch:

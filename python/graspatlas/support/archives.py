@@ -9,6 +9,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from graspatlas.support.machine import available_bytes
+
 __all__ = ["DamagedArchive", "read_arrays"]
 
 #: An archive may take this much memory in any case [bytes].
@@ -50,8 +52,6 @@ def read_arrays(stream: BinaryIO) -> dict[str, Any]:
 
 def _check_sizes(members: list[zipfile.ZipInfo], file_size: int) -> None:
     """Refuse archives that are small on the disk alone."""
-    from graspatlas.atlas.growth import available_bytes  # it imports what imports this module
-
     if len(members) > MOST_ARRAYS or len({member.filename for member in members}) < len(members):
         raise DamagedArchive(f"it holds more than {MOST_ARRAYS} arrays, or two of one name")
     total = sum(member.file_size for member in members)

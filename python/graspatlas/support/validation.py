@@ -1,9 +1,9 @@
-"""Plain data from files, checked: tables with known keys, numbers where numbers belong; and columns of tables."""
+"""Arguments and plain data from files, checked: tables with known keys, numbers where numbers belong."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any, TypeVar
 
 import numpy as np
@@ -14,13 +14,13 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 __all__ = [
     "checked_instance",
     "checked_table",
-    "joined",
     "number",
     "number_array",
     "numbers",
-    "pose_columns",
+    "positive",
     "read_only",
     "shown",
+    "whole",
 ]
 
 T = TypeVar("T", bound=np.generic)
@@ -62,7 +62,7 @@ def checked_table(
         optional: Keys that it may have; None allows any.
 
     Raises:
-        GraspAtlasError: If it is no table, lacks a key, or has an unknown one.
+        GraspAtlasError: If it is not a table, lacks a key, or has an unknown one.
     """
     if not isinstance(data, Mapping):
         raise GraspAtlasError(f"{what} must be a table, got {shown(data)}")
@@ -80,7 +80,7 @@ def number(value: Any, what: str) -> float:
     """A number.
 
     Raises:
-        GraspAtlasError: If it is none.
+        GraspAtlasError: If it is not a number.
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise GraspAtlasError(f"{what} must be a number, got {shown(value)}")
@@ -90,11 +90,52 @@ def number(value: Any, what: str) -> float:
         raise GraspAtlasError(f"{what} is too large a whole number") from None
 
 
+def positive(value: Any, what: str, most: float = float("inf")) -> float:
+    """A number above 0, and finite.
+
+    Args:
+        value: What came.
+        what: Its name for the message.
+        most: The largest that it may be.
+
+    Raises:
+        GraspAtlasError: If it is not.
+    """
+    kind = "a positive number" if most == float("inf") else f"above 0 and at most {most:g}"
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise GraspAtlasError(f"{what} must be {kind}, got {shown(value)}")
+    given = number(value, what)
+    if not 0.0 < given <= most or given == float("inf"):
+        raise GraspAtlasError(f"{what} must be {kind}, got {shown(value)}")
+    return given
+
+
+def whole(value: Any, what: str, least: int = 1, most: int | None = None) -> int:
+    """A whole number.
+
+    Args:
+        value: What came.
+        what: Its name for the message.
+        least: The smallest that it may be.
+        most: The largest that it may be; None for no limit.
+
+    Raises:
+        GraspAtlasError: If it is not.
+    """
+    kind = f"a whole number of at least {least}" if most is None else f"a whole number from {least} to {most}"
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise GraspAtlasError(f"{what} must be {kind}, got {shown(value)}")
+    given = int(value)
+    if given < least or (most is not None and given > most):
+        raise GraspAtlasError(f"{what} must be {kind}, got {shown(value)}")
+    return given
+
+
 def numbers(value: Any, what: str) -> tuple[float, ...]:
     """A row of numbers.
 
     Raises:
-        GraspAtlasError: If it is none.
+        GraspAtlasError: If it is not.
     """
     if isinstance(value, str) or not isinstance(value, Sequence):
         raise GraspAtlasError(f"{what} must be a list of numbers, got {shown(value)}")
@@ -105,7 +146,7 @@ def number_array(value: ArrayLike, what: str) -> NDArray[np.float64]:
     """An array of numbers.
 
     Raises:
-        GraspAtlasError: If it is none.
+        GraspAtlasError: If it is not.
     """
     try:
         return np.asarray(value, float)
@@ -118,30 +159,3 @@ def read_only(array: NDArray[T]) -> NDArray[T]:
     view: NDArray[T] = array.view()
     view.flags.writeable = False
     return view
-
-
-def joined(*tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Columns of several tables side by side.
-
-    Raises:
-        GraspAtlasError: If two have one name, as a joint called ``quality`` would.
-    """
-    columns: dict[str, Any] = {}
-    for table in tables:
-        for name in table:
-            if name in columns:
-                raise GraspAtlasError(f"two columns of the table would be called '{name}'; rename the joint or index")
-        columns |= table
-    return columns
-
-
-def pose_columns(name: str, xyz: NDArray[np.float64], quat_xyzw: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    """Columns of poses: ``<name>_x``, ``_y``, ``_z`` and ``<name>_qx``, ``_qy``, ``_qz``, ``_qw``.
-
-    Args:
-        name: What has the poses.
-        xyz: Positions [n, 3], metres.
-        quat_xyzw: Unit quaternions [n, 4].
-    """
-    places = {f"{name}_{axis}": xyz[:, i] for i, axis in enumerate("xyz")}
-    return {**places, **{f"{name}_q{axis}": quat_xyzw[:, i] for i, axis in enumerate("xyzw")}}

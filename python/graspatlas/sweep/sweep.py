@@ -21,8 +21,6 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from graspatlas.errors import GraspAtlasError
 from graspatlas.optimizer.optimize import optimize
 from graspatlas.problem.problem import Problem
@@ -33,6 +31,7 @@ from graspatlas.result.refinement import PeakStatus
 from graspatlas.result.result import Result
 from graspatlas.support.files import opened, replaced, writable_folder
 from graspatlas.support.interrupts import stoppable
+from graspatlas.support.progress import progress_bar
 from graspatlas.version import __version__
 
 __all__ = ["ROWS", "Run", "Sweep", "run_sweep"]
@@ -214,8 +213,7 @@ def run_sweep(
     left = [run for key, run in runs.items() if key not in finished or finished[key]["error"]]
     skipped = len(runs) - len(left)
     rows = dict(finished)
-    shown = sys.stderr.isatty() if progress is None else progress
-    bar = tqdm(total=len(left), desc="sweep", unit=" runs", disable=not shown, file=sys.stderr)
+    bar = progress_bar("sweep", "runs", len(left), progress)
     written = time.monotonic()
     try:
         for row in _rows_as_they_come(left, scheduler, workers):

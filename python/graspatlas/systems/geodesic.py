@@ -20,9 +20,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
-from tqdm import tqdm
 
 from graspatlas import _core
+from graspatlas.support.progress import progress_bar
 from graspatlas.systems.system import AnySystem
 
 __all__ = ["BOUND_TOLERANCE", "Allowed", "arc_lengths", "bridge", "evenly", "settle", "shorten"]
@@ -188,7 +188,7 @@ def shorten(
     band = _Band(system, X)
     least = LEAST_GAIN if allowed is None else LEAST_GAIN_LIMITED
     try:
-        with tqdm(total=MAX_STEPS, desc="path", unit=" steps", disable=not progress, delay=1.0) as bar:
+        with progress_bar("path", "steps", MAX_STEPS, progress) as bar:
             for _ in range(MAX_STEPS):
                 shorter = _pulled(band, reach, longest, allowed)
                 if shorter is None:

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graspatlas._core import Angles, AnySystem, PythonSystem, Rotations, Sphere, Torus
 from graspatlas.errors import GraspAtlasError
-from graspatlas.support.validation import number_array
+from graspatlas.support.validation import number_array, whole
 
 __all__ = [
     "Angles",
@@ -66,8 +66,7 @@ class System(PythonSystem):
         upper: ArrayLike = np.inf,
     ) -> None:
         for name, count in (("n_variables", n_variables), ("n_equations", n_equations)):
-            if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 0 <= count <= MOST_VARIABLES:
-                raise GraspAtlasError(f"{name} must be a whole number from 0 to {MOST_VARIABLES}, got {count!r}")
+            whole(count, name, 0, MOST_VARIABLES)
         try:
             low = np.broadcast_to(number_array(lower, "lower"), (n_variables,))
             high = np.broadcast_to(number_array(upper, "upper"), (n_variables,))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 
 from PIL import Image
-from tqdm import tqdm
 
+from graspatlas.support.progress import counted
 from graspatlas.viewer.render.picture import painted
 from graspatlas.viewer.render.text_images import DARK, GREY, legend_image, text_image
 from graspatlas.viewer.scene.animation import Film
@@ -34,7 +33,7 @@ def draw_strip(film: Film, width: int, height: int) -> Image.Image:
     layouts = [_Layout.of(film, columns, width, height - head - foot) for columns in range(1, len(film) + 1)]
     best = max(layouts, key=lambda layout: layout.magnification)
     sheet = Image.new("RGB", (width, height), PAPER)
-    for i in tqdm(range(len(film)), desc="picture", delay=1.0, disable=not sys.stderr.isatty(), file=sys.stderr):
+    for i in counted(range(len(film)), "picture", "grasps"):
         row, column = divmod(i, best.columns)
         picture = painted(film.frame(i), best.camera, best.wide, best.high)
         words = _words(film, i, min(best.high / 15.0, best.wide / 13.0))
