@@ -32,7 +32,7 @@ def main() -> None:
         quality = ga.quality.quality_name(result.quality).replace("_", " ")
         print(
             f"{name}: t = {problem.full_dimension}, k = {result.dimension}; {result.atlas.n_charts:,} charts, "
-            f"{result.status}; {result.feasible.sum():,} meet the requirements; {seconds:.1f} s; "
+            f"{result.status}; {result.accepted.sum():,} meet the requirements; {seconds:.1f} s; "
             f"{quality} {result.refined_best.quality:.3g}"
         )
 

@@ -51,7 +51,7 @@ def print_freedoms(problem: ga.Problem) -> None:
 def print_result(result: ga.Result, seconds: float) -> None:
     """Say how many grasps there are and what the best one is, in the palm's frame."""
     atlas, best = result.atlas, result.refined_best
-    print(f"{atlas.n_charts} grasps, {result.status}, {result.feasible.sum()} hold; {seconds:.1f} s in all")
+    print(f"{atlas.n_charts} grasps, {result.status}, {result.accepted.sum()} hold; {seconds:.1f} s in all")
     print(f"worst that holds {result.worst.quality:.3g}, best chart {result.best.quality:.3g}, best {best.quality:.4g}")
     grasps = ga.Grasps(result.problem, best.x)
     margin = float(ga.quality.force_closure_margin(grasps, friction=0.5)[0])

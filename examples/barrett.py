@@ -37,7 +37,7 @@ def best_grasp(problem: ga.Problem, **options: float) -> ga.Result:
         f"t = {problem.full_dimension}, k = {result.dimension}: {result.atlas.n_charts} grasps, {result.status}; ",
         end="",
     )
-    print(f"{result.feasible.sum()} hold; {seconds:.1f} s; best {result.refined_best.quality:.4g}")
+    print(f"{result.accepted.sum()} hold; {seconds:.1f} s; best {result.refined_best.quality:.4g}")
     return result
 
 

@@ -21,9 +21,9 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
 
     count = result.save_grasps(folder / "grasps.json", best=10)
-    result.save_grasps(folder / "grasps.csv", feasible=True)
+    result.save_grasps(folder / "grasps.csv", accepted=True)
     print(
-        f"{result.feasible.sum()} of {result.atlas.n_charts} grasps hold, the best {count} in {folder / 'grasps.json'}"
+        f"{result.accepted.sum()} of {result.atlas.n_charts} grasps hold, the best {count} in {folder / 'grasps.json'}"
     )
 
     # A planner knows where the object is, and asks where to bring the palm. Every grasp has another place for it, and
@@ -50,7 +50,7 @@ def main() -> None:
 
     # From the best grasp with one index to the best with another, without letting go and no joint too fast.
     other = result.by("force_closure_margin").best
-    path = ga.shortest_path(result, other, feasible=True)
+    path = ga.shortest_path(result, other, accepted=True)
     path.save_csv(folder / "path.csv", joint_speed=0.5)
     with open(folder / "path.csv", newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))

@@ -30,7 +30,7 @@ def main() -> None:
 
     result = ga.optimize(problem, refine=True)
     print(
-        f"{result.atlas.n_charts} grasps in {result.atlas.seconds:.2f} s, {result.status}; {result.feasible.sum()} hold"
+        f"{result.atlas.n_charts} grasps in {result.atlas.seconds:.2f} s, {result.status}; {result.accepted.sum()} hold"
     )
     best, worst = result.refined_best, result.worst
     for name, grasp in (("best", best), ("worst", worst)):
@@ -48,7 +48,7 @@ def main() -> None:
     found = ga.find_components(problem, max_seconds=20, require=list(result.requirements))
     for component in found.results:
         gap = 2000.0 * component.atlas.centers[:, 0]
-        holds = f"best {component.best.quality:.3f}" if component.feasible.any() else "none holds"
+        holds = f"best {component.best.quality:.3f}" if component.accepted.any() else "none holds"
         charts = component.atlas.n_charts
         print(f"component of {charts} grasps, jaws {gap.min():.1f} to {gap.max():.1f} mm apart: {holds}")
 

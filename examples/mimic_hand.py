@@ -23,7 +23,7 @@ def main() -> None:
 
     result = ga.optimize(problem, refine=True)
     print(
-        f"{result.atlas.n_charts} grasps in {result.atlas.seconds:.2f} s, {result.status}; {result.feasible.sum()} hold"
+        f"{result.atlas.n_charts} grasps in {result.atlas.seconds:.2f} s, {result.status}; {result.accepted.sum()} hold"
     )
     values = result.qualities[0], result.best.quality, result.refined_best.quality
     print(f"{result.quality}: first grasp {values[0]:.3f}, best {values[1]:.3f}, refined {values[2]:.3f}")

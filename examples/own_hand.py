@@ -65,7 +65,7 @@ def best_grasps(problem: ga.Problem, radius: float) -> ga.Result:
     options = {"dimension": dimension, "radius": radius, "epsilon": 0.5, "quality": "manipulability_volume"}
     result = ga.optimize(problem, **options, require=HOLDS, refine=True)
     print(f"k = {dimension}, r = {radius}: {result.atlas.n_charts} grasps in {result.atlas.seconds:.2f} s, ", end="")
-    print(f"{result.status}; {result.feasible.sum()} hold; best {result.refined_best.quality:.5g}")
+    print(f"{result.status}; {result.accepted.sum()} hold; best {result.refined_best.quality:.5g}")
     return result
 
 

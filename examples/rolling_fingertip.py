@@ -45,7 +45,7 @@ def search(problem: ga.Problem, dimension: int) -> ga.Result:
         problem, dimension=dimension, radius=0.25, epsilon=0.5, quality="smallest_semi_axis", require=HOLDS
     )
     print(f"  k = {dimension}, {problem.frozen_motions(dimension)} hand motions frozen: {result.atlas.n_charts} grasps")
-    print(f"  in {result.atlas.seconds:.1f} s, {result.status}; {result.feasible.sum()} hold")
+    print(f"  in {result.atlas.seconds:.1f} s, {result.status}; {result.accepted.sum()} hold")
     return result
 
 

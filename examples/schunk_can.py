@@ -35,7 +35,7 @@ def main() -> None:
 
     # The index alone likes grasps with all fingers on one side of the can. Ask for one that holds, as the file does.
     result = ga.optimize(problem, require=[ga.ForceClosure(friction=0.5, margin=0.02), ga.CollisionFree()])
-    print(f"{result.feasible.sum()} grasps hold; {result.refused}")
+    print(f"{result.accepted.sum()} grasps hold; {result.rejected}")
     print(f"best  {result.best}")
 
     apart = ga.optimize(problem, quality=spread, require=[ga.CollisionFree()])

@@ -13,8 +13,9 @@ import graspatlas as ga
 from graspatlas import _core
 from graspatlas.atlas import BOX_TAG, Closed
 from graspatlas.atlas.coverage import measure_coverage
+from graspatlas.atlas.verification import Check, check_atlas
 from graspatlas.cli import main
-from graspatlas.result.verification import Check, check_atlas, check_result
+from graspatlas.result.verification import check_result
 from graspatlas.systems import Sphere
 
 
@@ -188,7 +189,7 @@ def test_grasps_that_leave_the_hand_motions_fail(bottle, small_result):
     other = replace(bottle, motions=replace(bottle.motions, covariance=bottle.motions.covariance[::-1, ::-1]))
     atlas = ga.build_atlas(other.system(2), other.x1_array, radius=0.2, epsilon=0.5, max_charts=30)
     n = atlas.n_charts
-    report = check_result(replace(small_result, atlas=atlas, qualities=np.zeros(n), feasible=np.ones(n, bool)))
+    report = check_result(replace(small_result, atlas=atlas, qualities=np.zeros(n), accepted=np.ones(n, bool)))
     failed = [check.claim for check in report.checks if not check.passed]
     assert any("hand motions" in claim for claim in failed)
 

@@ -364,7 +364,7 @@ def test_part_of_a_name_finds_it(capsys):
 
 def test_path(cli, tmp_path):
     assert cli(*QUICK, "--require", "joint_margin:0.01", "--output", tmp_path)[0] == 0
-    status, out, err = cli("path", tmp_path, "--from", "worst", "--feasible", "--csv", tmp_path / "path.csv")
+    status, out, err = cli("path", tmp_path, "--from", "worst", "--accepted", "--csv", tmp_path / "path.csv")
     assert status == 0
     assert "path of length" in out
     assert "largest residual" in out

@@ -254,7 +254,7 @@ def test_best_come_first_and_those_without_a_grasp_last(can):
     """The can's smaller component has no grasp that holds it well."""
     holds = [ga.ForceClosure(friction=0.5, margin=0.02)]
     found = ga.find_components(can, require=holds, covered=30)
-    assert [bool(result.feasible.any()) for result in found.results] == [True, False]
+    assert [bool(result.accepted.any()) for result in found.results] == [True, False]
     assert found.best.quality == found.results[0].best.quality
     none = ga.find_components(can, require=[ga.ForceClosure(friction=0.5, margin=0.9)], covered=3)
     with pytest.raises(ga.GraspAtlasError, match="relax"):

@@ -8,7 +8,7 @@ import pytest
 from helpers import PythonSphere, Written, bare_system, chain, robot
 
 import graspatlas as ga
-from graspatlas.result.verification import check_atlas
+from graspatlas.atlas.verification import check_atlas
 from graspatlas.systems import Angles, Rotations, Sphere, Torus
 
 TWO_JOINTS = robot(chain("f", (0.0, 0.0, 0.1), ["0 0 1", "0 1 0"], 0.05, "continuous"))

@@ -118,7 +118,7 @@ def test_poses_of_a_batch_are_those_of_each(result: ga.Result) -> None:
 def test_json_says_all(result: ga.Result, tmp_path: Path) -> None:
     assert result.save_grasps(tmp_path / "grasps.json") == result.atlas.n_charts
     data = json.loads((tmp_path / "grasps.json").read_text(encoding="utf-8"))
-    assert (data["format"], data["version"], data["problem"]) == ("graspatlas grasps", 1, "schunk_oil_bottle")
+    assert (data["format"], data["version"], data["problem"]) == ("graspatlas grasps", 2, "schunk_oil_bottle")
     assert (data["hand"], data["object"], data["frames"]) == (
         "schunk_sah",
         "oil_bottle",
@@ -131,7 +131,7 @@ def test_json_says_all(result: ga.Result, tmp_path: Path) -> None:
     assert not any(row["refined"] for row in data["grasps"])
     for row in data["grasps"][::50]:
         grasp = result.grasp(row["chart"])
-        assert row["feasible"] == result.feasible[row["chart"]]
+        assert row["accepted"] == result.accepted[row["chart"]]
         assert row["indices"] == {
             "manipulability_volume": result.qualities[row["chart"]],
             "smallest_semi_axis": result.others["smallest_semi_axis"][row["chart"]],
@@ -145,19 +145,19 @@ def test_json_says_all(result: ga.Result, tmp_path: Path) -> None:
 
 
 def test_csv_is_flat(result: ga.Result, tmp_path: Path) -> None:
-    count = result.save_grasps(tmp_path / "grasps.csv", feasible=True)
+    count = result.save_grasps(tmp_path / "grasps.csv", accepted=True)
     rows = rows_of(tmp_path / "grasps.csv")
-    assert count == len(rows) == result.feasible.sum() < result.atlas.n_charts
+    assert count == len(rows) == result.accepted.sum() < result.atlas.n_charts
     axes = ["x", "y", "z", "qx", "qy", "qz", "qw"]
     assert list(rows[0]) == [
-        *("chart", "refined", "feasible", "manipulability_volume", "smallest_semi_axis"),
+        *("chart", "refined", "accepted", "manipulability_volume", "smallest_semi_axis"),
         *result.problem.hand.joints,
         *(f"{body}_{axis}" for body in ("palm", "object") for axis in axes),
         *(f"contact{i}_{part}" for i in range(3) for part in ("frame", "x", "y", "z", "nx", "ny", "nz")),
     ]
-    assert [int(row["chart"]) for row in rows] == np.flatnonzero(result.feasible).tolist()
+    assert [int(row["chart"]) for row in rows] == np.flatnonzero(result.accepted).tolist()
     for row in rows[::50]:
-        assert (row["feasible"], row["refined"]) == ("true", "false")
+        assert (row["accepted"], row["refined"]) == ("true", "false")
         grasp = result.grasp(int(row["chart"]))
         joints = {name: float(row[name]) for name in result.problem.hand.joints}
         assert joints == grasp.joint_positions
@@ -176,7 +176,7 @@ def test_csv_is_flat(result: ga.Result, tmp_path: Path) -> None:
         ]
         assert_touches(result.problem, pinocchio_places(result.problem, joints), palm, contacts)
     table = pd.read_csv(tmp_path / "grasps.csv")
-    assert table["feasible"].dtype == bool
+    assert table["accepted"].dtype == bool
     assert table["manipulability_volume"].max() == result.best.quality
 
 
@@ -209,12 +209,12 @@ def test_which_grasps(result: ga.Result, tmp_path: Path) -> None:
     assert charts(charts=np.array([5])) == [5]
     best = charts(best=4)
     assert best[0] == result.best.chart
-    left = np.where(result.feasible, result.qualities, -np.inf)
+    left = np.where(result.accepted, result.qualities, -np.inf)
     assert best == np.argsort(-left, kind="stable")[:4].tolist()
-    assert len(charts(best=10**6)) == result.feasible.sum()
+    assert len(charts(best=10**6)) == result.accepted.sum()
     assert charts(best=1, refined=True) == [result.refined_best.chart, result.best.chart]
     first, second = rows_of(tmp_path / "some.csv")
-    assert (first["refined"], first["feasible"], second["refined"]) == ("true", "true", "false")
+    assert (first["refined"], first["accepted"], second["refined"]) == ("true", "true", "false")
     top = result.refined_best
     assert float(first["manipulability_volume"]) == top.quality > result.best.quality
     assert float(first["smallest_semi_axis"]) == pytest.approx(top.semi_axes[0], rel=1e-6)
@@ -247,7 +247,7 @@ def test_an_index_that_was_lost(result: ga.Result, tmp_path: Path) -> None:
         ("g.csv", {"charts": [10**6]}, "chart 1000000 does not exist"),
         ("g.csv", {"charts": [True]}, "chart True does not exist"),
         ("g.csv", {"charts": []}, "charts names none"),
-        ("g.csv", {"charts": [1], "best": 2}, "give either charts, or best and feasible"),
+        ("g.csv", {"charts": [1], "best": 2}, "give either charts, or best and accepted"),
         ("g.csv", {"best": 0}, "best must be a whole number of at least 1, got 0"),
         ("g.csv", {"best": 1.5}, "best must be a whole number"),
         ("g.csv", {"refined": True}, "was not refined: give optimize refine=True"),
@@ -260,9 +260,9 @@ def test_wrong_choices(small_result: ga.Result, tmp_path: Path, name: str, choic
 
 
 def test_no_feasible_grasp(small_result: ga.Result, tmp_path: Path) -> None:
-    none = replace(small_result, feasible=np.zeros(small_result.atlas.n_charts, bool), refused={"mine": 9})
-    for choice in ({"best": 1}, {"feasible": True}):
-        with pytest.raises(ga.GraspAtlasError, match=r"none of \d+ grasps meets the requirements \(mine refused 9\)"):
+    none = replace(small_result, accepted=np.zeros(small_result.atlas.n_charts, bool), rejected={"mine": 9})
+    for choice in ({"best": 1}, {"accepted": True}):
+        with pytest.raises(ga.GraspAtlasError, match=r"none of \d+ grasps meets the requirements \(mine rejected 9\)"):
             none.save_grasps(tmp_path / "g.csv", **choice)  # type: ignore[arg-type]
     assert none.save_grasps(tmp_path / "g.csv") == none.atlas.n_charts
 
@@ -284,7 +284,7 @@ def test_table_of_charts(result: ga.Result) -> None:
     assert table.index.name == "chart"
     assert len(table) == atlas.n_charts
     assert table["manipulability_volume"].idxmax() == result.qualities.argmax()
-    assert table[table.feasible]["manipulability_volume"].max() == result.best.quality
+    assert table[table.accepted]["manipulability_volume"].max() == result.best.quality
     assert_allclose(table["smallest_semi_axis"], result.others["smallest_semi_axis"])
     assert_allclose(table[list(result.problem.hand.joints)], atlas.centers[:, :13])
     assert_allclose(table[["object_x", "object_y", "object_z"]], atlas.centers[:, 13:16], atol=1e-15)
@@ -429,7 +429,7 @@ def test_export_command_refuses(folder: Path, result: ga.Result, capfd: pytest.C
         status, printed, err = run(capfd, *words)
         assert (status, printed, err.count("\n")) == (2, "", 1)
         assert re.search(message, err), err
-    none = replace(result, feasible=np.zeros(result.atlas.n_charts, bool), refinement=None)
+    none = replace(result, accepted=np.zeros(result.atlas.n_charts, bool), refinement=None)
     none.save(folder / "none.npz")
     status, _, err = run(capfd, "export", folder / "none.npz", "--grasps", out, "--best", "1")
     assert (status, err) == (1, "schunk_oil_bottle: no grasp meets the requirements, nothing was written\n")

@@ -132,11 +132,11 @@ def test_lightness_of_the_colour_scale_grows() -> None:
 
 def test_requirements_are_seen(planar_result: ga.Result) -> None:
     some = planar_result.qualities > np.median(planar_result.qualities)
-    result = replace(planar_result, feasible=~some)
+    result = replace(planar_result, accepted=~some)
     picture = pixels(figures.plot_atlas(result))
     grey = (np.ptp(picture, axis=2) < 0.02) & (np.abs(picture[..., 0] - 0.81) < 0.03)
     assert grey.mean() > 0.01
-    none = replace(planar_result, feasible=np.zeros(planar_result.atlas.n_charts, bool))
+    none = replace(planar_result, accepted=np.zeros(planar_result.atlas.n_charts, bool))
     with pytest.raises(ga.GraspAtlasError, match="meets the requirements"):
         figures.plot_atlas(none)
 

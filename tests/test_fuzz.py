@@ -22,8 +22,8 @@ from hypothesis import strategies as st
 import graspatlas as ga
 from graspatlas import patches, quality, requirements
 from graspatlas.atlas.coverage import measure_coverage
+from graspatlas.atlas.verification import check_atlas
 from graspatlas.cli import main
-from graspatlas.result.verification import check_atlas
 from graspatlas.systems import Angles, Rotations, Sphere, Torus
 
 # A test that hangs, even inside compiled code, ends the run with the stack of where it hangs [s].
@@ -504,8 +504,8 @@ def test_damaged_results(stored, tmp_path, data):
     if result is not None:  # what was damaged does not matter: the archive has a sum of each part
         kept = ga.load_result(stored)
         assert result.problem.to_dict() == kept.problem.to_dict()
-        for name, array in {**kept.atlas.to_arrays(), "qualities": kept.qualities, "feasible": kept.feasible}.items():
-            part = getattr(result if name in ("qualities", "feasible") else result.atlas, name)
+        for name, array in {**kept.atlas.to_arrays(), "qualities": kept.qualities, "accepted": kept.accepted}.items():
+            part = getattr(result if name in ("qualities", "accepted") else result.atlas, name)
             assert part.tobytes() == array.tobytes()
 
 
@@ -546,7 +546,7 @@ def test_results_with_other_content(stored, tmp_path, capfd, header_too, place, 
             system = result.problem.system(result.dimension)
             assert max(np.abs(system.evaluate_residual(x)).max() for x in result.atlas.centers) < 1e-9
             assert (
-                summary["quality"]["best"] == result.qualities[result.feasible].max(initial=-INF) or not summary["best"]
+                summary["quality"]["best"] == result.qualities[result.accepted].max(initial=-INF) or not summary["best"]
             )
             json.dumps(summary, allow_nan=False)
 

@@ -11,7 +11,7 @@ from helpers import BENT, read_json, tripod_problem
 
 import graspatlas as ga
 from graspatlas import _core
-from graspatlas.result.verification import check_atlas
+from graspatlas.atlas.verification import check_atlas
 
 MANIPULABILITY = ("inverse_condition_number", "manipulability_volume", "smallest_semi_axis")
 PROBLEMS = ("schunk_can", "schunk_oil_bottle")

@@ -307,7 +307,7 @@ def header_with(arrays: dict[str, Any], **values: object) -> dict[str, Any]:
         ("problem", None, "problem must be a table"),
         ("others", 7, "damaged"),
         ("requirements", 7, "damaged"),
-        ("refused", [7], "damaged"),
+        ("rejected", [7], "damaged"),
         ("dimension", 10**30, "dimension must be a whole number"),
     ],
 )

@@ -122,7 +122,7 @@ def test_film_page_carries_every_placement(path: ga.GraspPath, tmp_path: Path) -
     assert_allclose(rows.transpose(0, 1, 3, 2), film.T[:, film.moving, :3], atol=1e-6)
     assert_allclose(data["qualities"], path.qualities[film.points])
     assert data["arc_lengths"][-1] == pytest.approx(path.length)
-    assert "feasible" not in data
+    assert "accepted" not in data
     assert len(text) < 6e6
 
 

@@ -34,7 +34,7 @@ def valued(result: ga.Result, values: ArrayLike, feasible: ArrayLike | None = No
     kept = np.zeros(result.atlas.n_charts, bool)
     kept[:n] = True if feasible is None else feasible
     others = dict(zip(names[1:], padded.T[1:], strict=True))
-    return replace(result, quality=names[0], qualities=padded[:, 0], others=others, feasible=kept), names
+    return replace(result, quality=names[0], qualities=padded[:, 0], others=others, accepted=kept), names
 
 
 def front_of(result: ga.Result, values: ArrayLike, feasible: ArrayLike | None = None) -> list[int]:
@@ -121,7 +121,7 @@ def test_the_ends_of_the_front_are_the_best_by_each_index(can: ga.Problem) -> No
     assert len(front) > 3
     assert front[0] == result.best.chart
     assert front[-1] == result.by(margin).best.chart
-    assert result.feasible[front].all()
+    assert result.accepted[front].all()
     assert ga.pareto_front(result, margin, VOLUME).tolist() == front[::-1].tolist()
 
 
@@ -132,7 +132,7 @@ def test_indices_may_be_callables(small_result: ga.Result) -> None:
 
     front = ga.pareto_front(small_result, VOLUME, height, CONDITION)
     values = np.column_stack([small_result.values(index) for index in (VOLUME, height, CONDITION)])
-    assert sorted(front) == brute_force(values, small_result.feasible)
+    assert sorted(front) == brute_force(values, small_result.accepted)
 
 
 def test_misuse(small_result: ga.Result) -> None:
@@ -142,13 +142,13 @@ def test_misuse(small_result: ga.Result) -> None:
         values_of(small_result, VOLUME, VOLUME)
     with pytest.raises(ga.GraspAtlasError, match="did you mean"):
         ga.pareto_front(small_result, VOLUME, "manipulability_volum")
-    none = replace(small_result, feasible=np.zeros_like(small_result.feasible))
+    none = replace(small_result, accepted=np.zeros_like(small_result.accepted))
     with pytest.raises(ga.GraspAtlasError, match="no grasp meets"):
         ga.pareto_front(none, VOLUME, CONDITION)
 
 
 def test_figure_shows_the_front(planar_result: ga.Result) -> None:
-    half = replace(planar_result, feasible=planar_result.qualities < np.median(planar_result.qualities))
+    half = replace(planar_result, accepted=planar_result.qualities < np.median(planar_result.qualities))
     figure = ga.plot_pareto(half, VOLUME, CONDITION)
     axes = figure.axes[0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("manipulability volume", "inverse condition number")
@@ -157,12 +157,12 @@ def test_figure_shows_the_front(planar_result: ga.Result) -> None:
     drawn = {line.get_label(): line.get_xydata() for line in axes.lines}
     assert f"Pareto front, {len(front)} grasp{'s' if len(front) > 1 else ''}" in drawn
     np.testing.assert_array_equal(drawn["first grasp"], values[:1])
-    np.testing.assert_array_equal(drawn["grasps"], values[half.feasible])
-    np.testing.assert_array_equal(drawn["requirements not met"], values[~half.feasible])
+    np.testing.assert_array_equal(drawn["grasps"], values[half.accepted])
+    np.testing.assert_array_equal(drawn["requirements not met"], values[~half.accepted])
     assert any(np.array_equal(points, front[::-1]) for points in drawn.values())
     ends = np.column_stack([axes.get_xlim(), axes.get_ylim()])
-    assert (ends[0] < values[half.feasible].min(axis=0)).all()
-    assert (ends[1] > values[half.feasible].max(axis=0)).all()
+    assert (ends[0] < values[half.accepted].min(axis=0)).all()
+    assert (ends[1] > values[half.accepted].max(axis=0)).all()
     assert len(figure.axes) == 4  # the front; both ends and the knee
 
 

@@ -171,7 +171,7 @@ def held(can: ga.Problem) -> ga.Result:
 
 @pytest.fixture(scope="module")
 def path(held: ga.Result) -> ga.GraspPath:
-    return ga.shortest_path(held, held.worst.chart, feasible=True)
+    return ga.shortest_path(held, held.worst.chart, accepted=True)
 
 
 def test_grasps_are_never_let_go(path: ga.GraspPath, held: ga.Result) -> None:
@@ -182,7 +182,7 @@ def test_grasps_are_never_let_go(path: ga.GraspPath, held: ga.Result) -> None:
     assert np.abs(arrays["hand_normals"] + arrays["object_normals"]).max() < 1e-6
     assert np.abs(held.problem.frozen_residual(path.x, 2)).max() < 1e-9
     assert screen(held.requirements, path.grasps)[0].all()  # type: ignore[arg-type]
-    assert path.feasible.all()
+    assert path.accepted.all()
     assert_allclose(path.qualities[[0, -1]], [held.worst.quality, held.best.quality])
     assert path.length >= np.linalg.norm(held.atlas.system.difference(path.x[0], path.x[-1]))
     assert (path.charts >= 0).all()
@@ -209,11 +209,11 @@ def test_a_path_goes_round_a_hole(can: ga.Problem) -> None:
         return np.asarray(np.linalg.norm(grasps.T_palm_object[:, :3, 3] - middle, axis=1) > 0.002)
 
     result = ga.optimize(can, require=[away])
-    path = ga.shortest_path(result, free.worst.chart, free.best.chart, feasible=True)
-    assert path.feasible.all()
+    path = ga.shortest_path(result, free.worst.chart, free.best.chart, accepted=True)
+    assert path.accepted.all()
     assert path.length > 1.001 * straight.length
     assert_sound(path, 0.1 * free.atlas.radius)
-    assert not ga.shortest_path(result, free.worst.chart, free.best.chart).feasible.all()
+    assert not ga.shortest_path(result, free.worst.chart, free.best.chart).accepted.all()
 
 
 def test_a_joint_trajectory(path: ga.GraspPath, tmp_path: Path) -> None:
@@ -243,7 +243,7 @@ def test_a_path_without_grasps_is_a_table_too(sphere: ga.Atlas, tmp_path: Path) 
 
 def test_ends_may_be_grasps(held: ga.Result, path: ga.GraspPath) -> None:
     between = path.x[len(path) // 2]
-    half = ga.shortest_path(held, held.worst, between, feasible=True)
+    half = ga.shortest_path(held, held.worst, between, accepted=True)
     assert_allclose(half.x[-1], between)
     assert half.length == pytest.approx(path.arc_length[len(path) // 2], rel=1e-2)
     assert half.charts[-1] == path.charts[len(path) // 2]
@@ -261,7 +261,7 @@ def test_what_was_not_stored_is_named(small_result: ga.Result, tmp_path: Path) -
     lost = replace(small_result, quality="mine", requirements=("yours",))
     path = ga.shortest_path(lost, 0, 5)
     with pytest.raises(ga.GraspAtlasError, match="'yours' is a callable"):
-        _ = path.feasible
+        _ = path.accepted
     path.save_csv(tmp_path / "path.csv")
     assert "quality" not in (tmp_path / "path.csv").read_text(encoding="utf-8").splitlines()[0]
 
@@ -297,21 +297,21 @@ def test_an_atlas_needs_an_end_and_has_no_requirements(sphere: ga.Atlas) -> None
     with pytest.raises(ga.GraspAtlasError, match="no best grasp; give end"):
         ga.shortest_path(sphere)
     with pytest.raises(ga.GraspAtlasError, match="no requirements"):
-        ga.shortest_path(sphere, 0, 5, feasible=True)
+        ga.shortest_path(sphere, 0, 5, accepted=True)
     half = ga.build_atlas(ga.systems.Sphere(3), [0, 0, 1], radius=0.1, epsilon=0.1, max_charts=50)
     with pytest.raises(ga.GraspAtlasError, match="no chart of the atlas covers end"):
         ga.shortest_path(half, 0, [0.0, 0.0, -1.0])
 
 
 def test_pieces_that_are_not_connected(held: ga.Result) -> None:
-    cut = held.feasible.copy()
+    cut = held.accepted.copy()
     cut[held.atlas.neighbours[held.best.chart]] = False
-    apart, start = replace(held, feasible=cut), int(np.flatnonzero(cut)[0])
+    apart, start = replace(held, accepted=cut), int(np.flatnonzero(cut)[0])
     words = r"not connected: the \d+ charts that meet the requirements form \d+ pieces.*end in one of 1;"
     with pytest.raises(ga.GraspAtlasError, match=words):
-        ga.shortest_path(apart, start, held.best.chart, feasible=True)
-    refused = int(np.flatnonzero(~held.feasible)[0])
+        ga.shortest_path(apart, start, held.best.chart, accepted=True)
+    refused = int(np.flatnonzero(~held.accepted)[0])
     with pytest.raises(ga.GraspAtlasError, match=rf"start \(chart {refused}\) does not meet the requirements"):
-        ga.shortest_path(held, refused, feasible=True)
+        ga.shortest_path(held, refused, accepted=True)
     with pytest.raises(ga.GraspAtlasError, match="relax one"):
-        ga.shortest_path(replace(held, feasible=np.zeros_like(cut)))
+        ga.shortest_path(replace(held, accepted=np.zeros_like(cut)))

@@ -15,8 +15,8 @@ from helpers import PythonSphere, Written, tripod_problem
 import graspatlas as ga
 from graspatlas import _core, patches
 from graspatlas.analysis.densify import densify
+from graspatlas.atlas.verification import check_atlas
 from graspatlas.quality import evaluate
-from graspatlas.result.verification import check_atlas
 from graspatlas.systems import Angles, AnySystem, Rotations, Sphere, Torus
 
 COPIES = {"pickled": lambda thing: pickle.loads(pickle.dumps(thing)), "deep": copy.deepcopy, "shallow": copy.copy}
@@ -115,7 +115,7 @@ def test_a_result_that_came_back_works(result, again):
     assert other.check().passed
     assert other.values("min_weight").tobytes() == result.values("min_weight").tobytes()
     assert other.atlas.locate(result.atlas.centers[7]) == result.atlas.locate(result.atlas.centers[7])
-    assert (other.meets(result.atlas.centers) == result.feasible).all()
+    assert (other.meets(result.atlas.centers) == result.accepted).all()
     assert ga.climb(other, 3, max_steps=2).x.tobytes() == ga.climb(result, 3, max_steps=2).x.tobytes()
 
 

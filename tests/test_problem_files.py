@@ -666,8 +666,8 @@ def test_the_files_requirements_are_the_default():
     assert [str(r) for r in problem.requirements] == ["force_closure:0.5:0.02", "collision_free:0.002:0"]
     result = ga.optimize(problem, radius=0.4)
     assert result.requirements == problem.requirements
-    assert 0 < result.feasible.sum() < len(result.feasible)
-    assert ga.optimize(problem, radius=0.4, require=()).feasible.all()
+    assert 0 < result.accepted.sum() < len(result.accepted)
+    assert ga.optimize(problem, radius=0.4, require=()).accepted.all()
     assert ga.optimize(problem, radius=0.4, require=[ga.JointMargin(0.01)]).requirements == (ga.JointMargin(0.01),)
 
 
@@ -702,7 +702,7 @@ def test_the_example_of_the_documentation_holds():
     problem = read_problem(text, "example.yaml")
     result = ga.optimize(problem)
     assert result.is_global
-    assert 100 < result.feasible.sum() < len(result.feasible)
+    assert 100 < result.accepted.sum() < len(result.accepted)
     assert result.check().passed
 
 

@@ -64,7 +64,7 @@ def test_the_refined_best_keeps_its_requirements(can: ga.Result) -> None:
 
 def test_random_local_searches_do_not_beat_it(can: ga.Result) -> None:
     rng = np.random.default_rng(5)
-    starts = rng.choice(np.flatnonzero(can.feasible), 15, replace=False)
+    starts = rng.choice(np.flatnonzero(can.accepted), 15, replace=False)
     ends = [ga.climb(can, int(chart)).quality for chart in starts]
     assert max(ends) <= can.refined_best.quality * (1.0 + AGREEMENT)
     assert np.ptp(ends) > 0.01 * can.refined_best.quality, "all ended on one peak: the test says nothing"
@@ -119,7 +119,7 @@ def test_another_index_chooses_another_best(can: ga.Result) -> None:
     other = can.by("smallest_semi_axis")
     assert other.quality == "smallest_semi_axis"
     assert other.refinement is None
-    assert other.best.quality == can.values("smallest_semi_axis")[can.feasible].max()
+    assert other.best.quality == can.values("smallest_semi_axis")[can.accepted].max()
     back = other.by("manipulability_volume")
     np.testing.assert_array_equal(back.qualities, can.qualities)
 
@@ -140,7 +140,7 @@ def test_wrong_input_is_refused(can: ga.Result) -> None:
     with pytest.raises(ga.GraspAtlasError, match="refine=True"):
         _ = ga.optimize(problem).refined_best
     with pytest.raises(ga.GraspAtlasError, match="does not meet the requirements"):
-        ga.climb(can, int(np.flatnonzero(~can.feasible)[0]))
+        ga.climb(can, int(np.flatnonzero(~can.accepted)[0]))
     with pytest.raises(ga.GraspAtlasError, match="a climb starts from"):
         ga.climb(can, np.zeros(3))
     with pytest.raises(ga.GraspAtlasError, match="misses its equations"):

@@ -78,11 +78,11 @@ def test_equal_charts_count_once(planar_result: ga.Result) -> None:
 def test_local_maxima_meet_the_requirements(planar_result: ga.Result) -> None:
     feasible = np.ones(planar_result.atlas.n_charts, bool)
     feasible[planar_result.best.chart] = False
-    result = replace(planar_result, feasible=feasible)
+    result = replace(planar_result, accepted=feasible)
     found = local_maxima(result)
     assert planar_result.best.chart not in found
     assert found[0] == result.best.chart
-    assert local_maxima(replace(planar_result, feasible=np.zeros_like(feasible))).size == 0
+    assert local_maxima(replace(planar_result, accepted=np.zeros_like(feasible))).size == 0
 
 
 @pytest.mark.parametrize("name", ["planar_result", "can_result", "bottle_result"])
@@ -158,7 +158,7 @@ def test_experiments_have_no_requirements() -> None:
     result = run(Setting("schunk_can", 2, 0.4, 0.5, "manipulability_volume"))
     assert result.problem.requirements
     assert result.requirements == ()
-    assert result.feasible.all()
+    assert result.accepted.all()
 
 
 def test_the_variance_that_is_kept_is_measured(can_result: ga.Result, planar_result: ga.Result) -> None:
@@ -208,7 +208,7 @@ def test_climbs_among_grasps_that_hold(can_result: ga.Result, monkeypatch: pytes
     held = holding(can_result)
     outcome = study(held, "can", progress=False)
     assert len(outcome.climbs) == 12
-    assert all(held.feasible[end.chart] for end in outcome.climbs)
+    assert all(held.accepted[end.chart] for end in outcome.climbs)
     assert outcome.unbounded == 0
     assert outcome.at_best + outcome.at_others == 12
     assert outcome.below <= 12

@@ -92,8 +92,8 @@ def test_best_grasp_of_the_can_could_be_executed(can: ga.Result) -> None:
     assert margin_by_linear_programming(can.best, FRICTION) >= 0.02
     p = can.best.contact_points
     assert min(np.linalg.norm(p[i] - p[j]) for i, j in [(0, 1), (0, 2), (1, 2)]) > 0.01
-    assert can.best.quality == can.qualities[can.feasible].max()
-    assert can.worst.quality == can.qualities[can.feasible].min()
+    assert can.best.quality == can.qualities[can.accepted].max()
+    assert can.worst.quality == can.qualities[can.accepted].min()
     assert can.best.quality < can.qualities.max()
     assert can.is_global
 
@@ -130,8 +130,8 @@ def test_refusals_are_counted_cheapest_first() -> None:
     problem = ga.load_problem("schunk_can")
     require = [ga.CollisionFree(), ga.ForceClosure(FRICTION), ga.JointMargin(0.05)]
     result = ga.optimize(problem, radius=0.4, require=require)
-    assert [name.split(":")[0] for name in result.refused] == ["joint_margin", "force_closure", "collision_free"]
-    assert sum(result.refused.values()) + result.feasible.sum() == result.atlas.n_charts
+    assert [name.split(":")[0] for name in result.rejected] == ["joint_margin", "force_closure", "collision_free"]
+    assert sum(result.rejected.values()) + result.accepted.sum() == result.atlas.n_charts
     lower, upper = problem.hand.joint_limits
     q = result.best.q
     assert min((q - lower).min(), (upper - q).min()) >= 0.05
@@ -153,13 +153,13 @@ def test_the_joint_margin_is_kept_from_both_limits(can: ga.Result, side: int) ->
 
 def test_continuous_joints_have_no_limits_to_keep_from() -> None:
     result = ga.optimize(ga.load_problem("planar_hand"), require=[ga.JointMargin(0.5)])
-    assert result.feasible.all()
+    assert result.accepted.all()
 
 
 def test_no_grasp_meets_the_requirements(capsys: pytest.CaptureFixture[str]) -> None:
     result = ga.optimize(ga.load_problem("schunk_can"), radius=0.4, require=[ga.ForceClosure(FRICTION, 0.3)])
-    assert not result.feasible.any()
-    with pytest.raises(ga.GraspAtlasError, match=r"force_closure:0.5:0.3 refused \d+"):
+    assert not result.accepted.any()
+    with pytest.raises(ga.GraspAtlasError, match=r"force_closure:0.5:0.3 rejected \d+"):
         _ = result.best
     assert result.check()
     from graspatlas.cli import main
@@ -179,9 +179,9 @@ def test_predicates_one_by_one_and_in_batch() -> None:
         return grasps.T_palm_object[:, 0, 3] < 0.0
 
     one, batch = (ga.optimize(problem, require=[predicate]) for predicate in (left, left_of_all))
-    assert (one.feasible == batch.feasible).all()
+    assert (one.accepted == batch.accepted).all()
     assert one.best.object_xyz[0] < 0.0
-    assert one.refused == {"left": int((~one.feasible).sum())}
+    assert one.rejected == {"left": int((~one.accepted).sum())}
 
 
 @pytest.mark.parametrize(
@@ -230,11 +230,11 @@ def test_requirements_are_stored_and_verified_again(can: ga.Result, tmp_path: An
     can.save(tmp_path / "can.npz")
     loaded = ga.load_result(tmp_path / "can.npz")
     assert loaded.requirements == can.requirements
-    assert (loaded.feasible == can.feasible).all()
+    assert (loaded.accepted == can.accepted).all()
     assert loaded.best.chart == can.best.chart
     claims = [check.claim for check in loaded.check().checks]
     assert "the best grasp fails requirement force_closure:0.5:0.02" in claims
     assert loaded.check()
-    object.__setattr__(loaded, "feasible", ~can.feasible)
+    object.__setattr__(loaded, "accepted", ~can.accepted)
     del loaded.__dict__["best"]
     assert not loaded.check()

@@ -33,8 +33,8 @@ def assert_equal(a: ga.Result, b: ga.Result) -> None:
         assert array.shape == other.shape
         assert array.tobytes() == other.tobytes(), name
     assert a.qualities.tobytes() == b.qualities.tobytes()
-    assert a.feasible.tobytes() == b.feasible.tobytes()
-    assert dict(a.refused) == dict(b.refused)
+    assert a.accepted.tobytes() == b.accepted.tobytes()
+    assert dict(a.rejected) == dict(b.rejected)
     for name in ("status", "dimension", "is_global", "quality_seconds"):
         assert getattr(a, name) == getattr(b, name)
     for name in ("radius", "epsilon", "seconds"):
@@ -222,7 +222,7 @@ def set_header(**values):
 
 ARRAYS = (
     "qualities",
-    "feasible",
+    "accepted",
     "centers",
     "bases",
     "residuals",
@@ -345,7 +345,7 @@ def test_the_best_is_feasible_whatever_the_index(small_result):
     feasible[[7, 9]] = True
     for value in (-np.inf, 0.0, np.inf):
         qualities = np.full(small_result.atlas.n_charts, value)
-        result = replace(small_result, feasible=feasible, qualities=qualities)
+        result = replace(small_result, accepted=feasible, qualities=qualities)
         assert (result.best.chart, result.worst.chart) == (7, 7)
 
 

@@ -196,18 +196,18 @@ def test_best_sample_lies_between_the_best_chart_and_the_refined_best(can: ga.Pr
         can, radius=0.3, epsilon=0.5, quality="manipulability_volume", require=holds, refine=True, progress=False
     )
     samples = densify(result, 0.1, progress=False)
-    assert samples.feasible.all() == (samples.refused["force_closure:0.5:0"] == 0)
+    assert samples.accepted.all() == (samples.rejected["force_closure:0.5:0"] == 0)
     assert result.best.quality < samples.best.quality <= 1.001 * result.refined_best.quality
     # Halving the way to the refined best is little to ask of a grid three times as fine.
     assert samples.best.quality - result.best.quality > 0.3 * (result.refined_best.quality - result.best.quality)
     assert samples.best.chart in samples.charts
     assert np.abs(result.atlas.system.evaluate_residual(samples.best.x)).max() < ON_MANIFOLD
-    assert samples.best.x.tolist() in samples.x[samples.feasible].tolist()
+    assert samples.best.x.tolist() in samples.x[samples.accepted].tolist()
     # The charts' centres are samples, with the values that the result has.
     centres = (samples.u == 0.0).all(axis=1)
     np.testing.assert_array_equal(samples.charts[centres], np.arange(result.atlas.n_charts))
     np.testing.assert_allclose(samples.qualities[centres], result.qualities, rtol=1e-9)
-    np.testing.assert_array_equal(samples.feasible[centres], result.feasible)
+    np.testing.assert_array_equal(samples.accepted[centres], result.accepted)
     slack = min(result.atlas.system.slack(x).min() for x in samples.x)
     assert slack >= -INSIDE
 
@@ -242,15 +242,15 @@ def test_jumps_by_hand(small_result: ga.Result) -> None:
     # Refused, the chart counts as the worst that is not, and nothing is left to jump to.
     feasible = np.ones(atlas.n_charts, bool)
     feasible[i] = False
-    np.testing.assert_array_equal(jumps(replace(result, feasible=feasible)), 0.0)
-    np.testing.assert_array_equal(jumps(replace(result, feasible=feasible, qualities=values - 5.0)), 0.0)
+    np.testing.assert_array_equal(jumps(replace(result, accepted=feasible)), 0.0)
+    np.testing.assert_array_equal(jumps(replace(result, accepted=feasible, qualities=values - 5.0)), 0.0)
     # Where the index is level, the border of those that hold still jumps: from the worst that holds.
     level = np.full(atlas.n_charts, 2.0)
     far = int(np.setdiff1d(np.arange(atlas.n_charts), [i, *neighbours])[-1])
     level[far] = 0.5
-    got = jumps(replace(result, feasible=feasible, qualities=level))
+    got = jumps(replace(result, accepted=feasible, qualities=level))
     np.testing.assert_array_equal(got[[i, *np.setdiff1d(neighbours, atlas.neighbours[far])]], 1.5)
-    np.testing.assert_array_equal(jumps(replace(result, feasible=np.zeros_like(feasible))), 0.0)
+    np.testing.assert_array_equal(jumps(replace(result, accepted=np.zeros_like(feasible))), 0.0)
 
 
 def test_a_share_fills_the_charts_that_jump_most(small_result: ga.Result) -> None:
@@ -280,7 +280,7 @@ def test_interrupted_work_is_kept(small_result: ga.Result, monkeypatch: pytest.M
     samples = densify(replace(small_result, quality=stopped), 0.05)
     assert not samples.complete
     assert whole.complete
-    assert len(samples) == len(samples.qualities) == len(samples.feasible) == sum(calls[:3])
+    assert len(samples) == len(samples.qualities) == len(samples.accepted) == sum(calls[:3])
     np.testing.assert_array_equal(samples.x, whole.x[: len(samples)])
     assert samples.best.quality == samples.qualities.max()
 
@@ -317,11 +317,11 @@ def test_command_line(small_result: ga.Result, tmp_path: Path, capsys: pytest.Ca
     assert main(["densify", str(tmp_path), "0.07", "--share", "0.3", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     samples = densify(small_result, 0.07, share=0.3)
-    assert data["n_samples"] == data["n_feasible"] == len(samples)
+    assert data["n_samples"] == data["n_accepted"] == len(samples)
     assert data["best"]["quality"] == pytest.approx(samples.best.quality)
     assert data["best_chart"] == pytest.approx(small_result.best.quality)
     with np.load(tmp_path / "samples.npz", allow_pickle=False) as stored:
-        assert set(stored.files) == {"x", "charts", "u", "qualities", "feasible"}
+        assert set(stored.files) == {"x", "charts", "u", "qualities", "accepted"}
         np.testing.assert_array_equal(stored["x"], samples.x)
     assert main(["densify", str(tmp_path / "result.npz"), "0.1"]) == 0
     said = capsys.readouterr().out

@@ -9,7 +9,7 @@ from helpers import PythonSphere, Written
 import graspatlas as ga
 from graspatlas import _core
 from graspatlas.atlas.growth import Growth, outlook
-from graspatlas.result.verification import check_atlas
+from graspatlas.atlas.verification import check_atlas
 from graspatlas.support.machine import available_bytes, available_threads
 from graspatlas.systems import Angles, Rotations, Sphere
 

@@ -10,8 +10,9 @@ from graspatlas.analysis.climb import Climb, Peak, climb, local_maxima, peaks_of
 from graspatlas.analysis.densify import Samples, densify
 from graspatlas.analysis.pareto import pareto_front
 from graspatlas.analysis.refine import refine
-from graspatlas.atlas.atlas import Atlas, Closed, Status
+from graspatlas.atlas.atlas import Atlas
 from graspatlas.atlas.build import build_atlas
+from graspatlas.atlas.status import Closed, Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasp, Grasps
 from graspatlas.hand import motions

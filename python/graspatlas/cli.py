@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspatlas.analysis.climb import MAX_STEPS
-from graspatlas.atlas.atlas import Status
 from graspatlas.atlas.checkpoints import CheckpointFolder
+from graspatlas.atlas.status import Status
 from graspatlas.commands.arguments import path_word
 from graspatlas.commands.exit_status import FAILED, INTERRUPTED, MISUSE
 from graspatlas.commands.problem import add_problem_commands
@@ -252,7 +252,7 @@ def _optimize(options: argparse.Namespace) -> int:
     say(json.dumps(result.summary()) if options.json else _report(result, folder))
     if result.status is Status.INTERRUPTED:
         return INTERRUPTED
-    return 0 if result.feasible.any() else FAILED
+    return 0 if result.accepted.any() else FAILED
 
 
 def _report_components(found: Components, options: argparse.Namespace, folder: Path | None) -> int:
@@ -272,7 +272,7 @@ def _report_components(found: Components, options: argparse.Namespace, folder: P
         say(_report(best, folder))
     if found.status is SearchStatus.INTERRUPTED:
         return INTERRUPTED
-    return 0 if best.feasible.any() else FAILED
+    return 0 if best.accepted.any() else FAILED
 
 
 def _component_lines(found: Components) -> list[str]:
@@ -282,7 +282,7 @@ def _component_lines(found: Components) -> list[str]:
         "confidence"
     ]
     for number, (result, hits) in enumerate(zip(found.results, found.hits, strict=True), start=1):
-        quality = f"best {result.best.quality:.6g}" if result.feasible.any() else "no grasp meets the requirements"
+        quality = f"best {result.best.quality:.6g}" if result.accepted.any() else "no grasp meets the requirements"
         lines.append(
             f"  component {number}: {result.atlas.n_charts} charts, hit {hits} times, {quality}; {result.status}"
         )
@@ -314,9 +314,9 @@ def _report(result: Result, folder: Path | None) -> str:
             f"such points are missing, with 95 % confidence"
         )
     if result.requirements:
-        counts = ", ".join(f"{name} refused {count}" for name, count in result.refused.items())
-        lines.append(f"  {result.feasible.sum()} grasps meet the requirements; asked in turn, {counts}")
-    lines += _best_lines(result) if result.feasible.any() else ["  no best grasp: relax a requirement"]
+        counts = ", ".join(f"{name} rejected {count}" for name, count in result.rejected.items())
+        lines.append(f"  {result.accepted.sum()} grasps meet the requirements; checked in this order, {counts}")
+    lines += _best_lines(result) if result.accepted.any() else ["  no best grasp: relax a requirement"]
     if result.refinement:
         lines += _refined_lines(result)
     lines += [f"  better grasps may exist: {doubt}" for doubt in result.atlas.doubts]

@@ -14,7 +14,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,14 +25,12 @@ from graspatlas import _core
 from graspatlas.analysis.runaways import climbs_a_needle, followed, is_sharp, levels_around, never_levels_off
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasps
+from graspatlas.problem.problem import Problem
 from graspatlas.quality.evaluation import Quality, evaluate
 from graspatlas.requirements.screening import Require, Requirement, screen
+from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.support.deadlines import deadline_after
-from graspatlas.support.validation import number_array, shown, whole
-
-if TYPE_CHECKING:
-    from graspatlas.problem.problem import Problem
-    from graspatlas.result.result import Result
+from graspatlas.support.validation import checked_instance, number_array, shown, whole
 
 __all__ = ["Climb", "Peak", "climb", "local_maxima", "peaks_of"]
 
@@ -66,7 +63,7 @@ DIRECTIONS = 16
 SAME_PEAK = 0.5
 
 
-def local_maxima(result: Result) -> IntArray:
+def local_maxima(result: GraspAtlas) -> IntArray:
     """Charts that no neighbour beats, the best first; charts that do not meet the result's requirements do not count.
 
     Charts of equal quality that are connected count once, by the first of them, and only if none of them has a better
@@ -78,9 +75,8 @@ def local_maxima(result: Result) -> IntArray:
     Returns:
         Charts [p], by decreasing quality.
     """
-    if not hasattr(result, "atlas"):
-        raise GraspAtlasError(f"result must be what graspatlas.optimize returned, got {type(result).__name__}")
-    atlas, q = result.atlas, np.where(result.feasible, result.qualities, -np.inf)
+    checked_instance(result, GraspAtlas, "result", "graspatlas.optimize")
+    atlas, q = result.atlas, np.where(result.accepted, result.qualities, -np.inf)
     i, j = atlas.neighbour_pairs.T
     equal = q[i] == q[j]
     graph = coo_array((np.ones(equal.sum()), (i[equal], j[equal])), shape=(atlas.n_charts, atlas.n_charts))
@@ -89,7 +85,7 @@ def local_maxima(result: Result) -> IntArray:
     beaten[group[i[q[i] < q[j]]]] = True
     beaten[group[j[q[j] < q[i]]]] = True
     first = np.unique(group, return_index=True)[1]
-    charts = first[~beaten & result.feasible[first]]
+    charts = first[~beaten & result.accepted[first]]
     return np.asarray(charts[np.argsort(-q[charts], kind="stable")], np.int64)
 
 
@@ -129,7 +125,7 @@ class Climb:
 
 
 def climb(
-    result: Result,
+    result: GraspAtlas,
     start: int | ArrayLike,
     *,
     all_motions: bool = False,
@@ -158,8 +154,7 @@ def climb(
         GraspAtlasError: If there is no such chart, the start is no feasible grasp or does not meet the requirements, or
             the index fails.
     """
-    if not hasattr(result, "atlas"):
-        raise GraspAtlasError(f"result must be what graspatlas.optimize returned, got {type(result).__name__}")
+    checked_instance(result, GraspAtlas, "result", "graspatlas.optimize")
     whole(max_steps, "max_steps")
     deadline = deadline_after(max_seconds)
     hill = _Hill.of(result, all_motions)
@@ -173,7 +168,7 @@ def climb(
         )
     if not hill.meets(x):
         name = f"chart {chart}" if chart >= 0 else "the grasp"
-        raise GraspAtlasError(f"{name} does not meet the requirements; start from one that does, see result.feasible")
+        raise GraspAtlasError(f"{name} does not meet the requirements; start from one that does, see result.accepted")
     value = float(evaluate(result.quality, hill.grasps(x))[0])
     reach = hill.radius
     qualities = [value]
@@ -211,7 +206,7 @@ def _ended(hill: _Hill, end: Climb) -> Climb:
     return end
 
 
-def _start(result: Result, start: int | ArrayLike) -> tuple[int, Array]:
+def _start(result: GraspAtlas, start: int | ArrayLike) -> tuple[int, Array]:
     """Chart and grasp that a climb starts from; chart -1 for a grasp that was given."""
     atlas = result.atlas
     if isinstance(start, int | np.integer) and not isinstance(start, bool):
@@ -236,14 +231,9 @@ class _Hill:
     radius: float
 
     @classmethod
-    def of(cls, result: Result, all_motions: bool) -> _Hill:
-        unknown = [r for r in result.requirements if isinstance(r, str)]
-        if unknown:
-            raise GraspAtlasError(
-                f"requirement '{unknown[0]}' is a function, which files do not keep: compute the result again"
-            )
+    def of(cls, result: GraspAtlas, all_motions: bool) -> _Hill:
         system = result.problem.system(result.problem.largest_dimension if all_motions else result.dimension)
-        return cls(result.problem, system, result.quality, tuple(result.requirements), result.atlas.radius)  # type: ignore[arg-type]
+        return cls(result.problem, system, result.quality, result.requirements, result.atlas.radius)
 
     def grasps(self, X: ArrayLike) -> Grasps:
         return Grasps(self.problem, X, self.system)
@@ -362,7 +352,7 @@ class Peak:
         return f"<Peak of quality {self.quality:.6g}, where {len(self.climbs)} climbs ended>"
 
 
-def peaks_of(result: Result, climbs: Sequence[Climb]) -> list[Peak]:
+def peaks_of(result: GraspAtlas, climbs: Sequence[Climb]) -> list[Peak]:
     """Group climbs by where they ended, the best peak first.
 
     Ends that are linked by distances of at most half a chart radius belong to one peak.

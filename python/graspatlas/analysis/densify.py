@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,16 +30,15 @@ from graspatlas import _core
 from graspatlas.atlas.atlas import Atlas, shortest_way
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasp, Grasps
+from graspatlas.problem.problem import Problem
 from graspatlas.quality.evaluation import evaluate
 from graspatlas.requirements.screening import screen
+from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.pickling import Light
 from graspatlas.support.progress import progress_bar
+from graspatlas.support.renamed import renamed_attribute
 from graspatlas.support.validation import positive
-
-if TYPE_CHECKING:
-    from graspatlas.problem.problem import Problem
-    from graspatlas.result.result import Result
 
 __all__ = ["MOST_SAMPLES", "Grid", "Samples", "densify", "jumps", "lay_grid", "most_samples"]
 
@@ -95,15 +94,18 @@ class Samples(Grid):
     Attributes:
         problem: The problem.
         qualities: The result's index at each sample [m].
-        feasible: Which samples meet the result's requirements [m].
-        refused: How many samples each requirement refused, of those that the ones before it had left.
+        accepted: Which samples meet the result's requirements [m].
+        rejected: How many samples each requirement rejected, of those that the ones before it had left.
     """
 
     problem: Problem
     qualities: Array
-    feasible: NDArray[np.bool_]
-    refused: dict[str, int]
+    accepted: NDArray[np.bool_]
+    rejected: dict[str, int]
     __repr__ = Grid.__repr__
+
+    feasible = renamed_attribute("feasible", "accepted")
+    refused = renamed_attribute("refused", "rejected")
 
     @cached_property
     def best(self) -> Grasp:
@@ -112,9 +114,9 @@ class Samples(Grid):
         Raises:
             GraspAtlasError: If no sample meets them.
         """
-        candidates = np.flatnonzero(self.feasible)
+        candidates = np.flatnonzero(self.accepted)
         if len(candidates) == 0:
-            counts = ", ".join(f"{name} refused {count}" for name, count in self.refused.items()) or "none was made"
+            counts = ", ".join(f"{name} rejected {count}" for name, count in self.rejected.items()) or "none was made"
             raise GraspAtlasError(f"none of {len(self)} samples meets the requirements ({counts}): relax one")
         at = int(candidates[np.argmax(self.qualities[candidates])])
         one = Grasps(self.problem, self.x[at])[0]
@@ -122,11 +124,11 @@ class Samples(Grid):
 
     def to_arrays(self) -> dict[str, Any]:
         """All arrays by name, for storing: ``np.savez_compressed("samples.npz", **samples.to_arrays())``."""
-        return {name: getattr(self, name) for name in ("x", "charts", "u", "qualities", "feasible")}
+        return {name: getattr(self, name) for name in ("x", "charts", "u", "qualities", "accepted")}
 
 
 @stoppable()
-def densify(result: Result, spacing: float, *, share: float = 1.0, progress: bool | None = None) -> Samples:
+def densify(result: GraspAtlas, spacing: float, *, share: float = 1.0, progress: bool | None = None) -> Samples:
     """Read the index on a denser grid: inside the polytopes, at a spacing of your choice.
 
     Everywhere, or where the index changes most from chart to chart: see :func:`jumps`. Ctrl-C keeps what there is.
@@ -148,11 +150,6 @@ def densify(result: Result, spacing: float, *, share: float = 1.0, progress: boo
     Source: "Global Optimization of Robotic Grasps", end of Section IV.
     """
     positive(share, "share", most=1.0)
-    unknown = [r for r in result.requirements if isinstance(r, str)]
-    if unknown:
-        raise GraspAtlasError(
-            f"requirement '{unknown[0]}' is a function, which files do not keep: compute the result again"
-        )
     count = int(np.ceil(share * result.atlas.n_charts))
     charts = np.sort(np.argsort(-jumps(result), kind="stable")[:count])
     done: list[tuple[Grid, Array, NDArray[np.bool_], dict[str, int]]] = []
@@ -160,9 +157,9 @@ def densify(result: Result, spacing: float, *, share: float = 1.0, progress: boo
     complete = True
     try:
         for block in blocks:
-            grasps = Grasps(result.problem, block.x, result.atlas.system)  # type: ignore[arg-type]
-            feasible, refused = screen(result.requirements, grasps)  # type: ignore[arg-type]
-            done.append((block, evaluate(result.quality, grasps) if len(block) else np.zeros(0), feasible, refused))
+            grasps = Grasps(result.problem, block.x, result.system)
+            accepted, rejected = screen(result.requirements, grasps)
+            done.append((block, evaluate(result.quality, grasps) if len(block) else np.zeros(0), accepted, rejected))
     except KeyboardInterrupt:
         complete = False
     finally:
@@ -171,26 +168,26 @@ def densify(result: Result, spacing: float, *, share: float = 1.0, progress: boo
         **vars(_joined(result.atlas, [block for block, *_ in done], complete)),
         problem=result.problem,
         qualities=np.concatenate([np.zeros(0), *(qualities for _, qualities, _, _ in done)]),
-        feasible=np.concatenate([np.zeros(0, bool), *(feasible for _, _, feasible, _ in done)]),
-        refused={name: sum(refused[name] for *_, refused in done) for name in (done[0][-1] if done else ())},
+        accepted=np.concatenate([np.zeros(0, bool), *(accepted for _, _, accepted, _ in done)]),
+        rejected={name: sum(rejected[name] for *_, rejected in done) for name in (done[0][-1] if done else ())},
     )
 
 
-def jumps(result: Result) -> Array:
+def jumps(result: GraspAtlas) -> Array:
     """How much the index changes from each chart to a neighbour, at most [n].
 
     It is the largest difference between the values of the chart and of a neighbour, not divided by their distance: what
     the centres may miss between them. A grasp that does not meet the requirements has the value of the worst that
     does, so that the border of those that do is a jump, the higher the better the grasps at it are; and charts amid
-    refused ones jump by nothing.
+    rejected ones jump by nothing.
 
     Args:
         result: The result.
     """
     n = result.atlas.n_charts
-    if not result.feasible.any():
+    if not result.accepted.any():
         return np.zeros(n)
-    values = np.where(result.feasible, result.qualities, result.qualities[result.feasible].min())
+    values = np.where(result.accepted, result.qualities, result.qualities[result.accepted].min())
     i, j = result.atlas.neighbour_pairs.T
     with np.errstate(invalid="ignore"):  # of two infinite values
         differences = np.nan_to_num(np.abs(values[i] - values[j]), nan=0.0, posinf=np.inf)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.quality.evaluation import Quality, quality_name
-from graspatlas.result.result import Result
+from graspatlas.result.grasp_atlas import GraspAtlas
 
 __all__ = ["knee", "pareto_front", "values_of"]
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
-def pareto_front(result: Result, *indices: Quality) -> IntArray:
+def pareto_front(result: GraspAtlas, *indices: Quality) -> IntArray:
     """Charts that no other chart dominates, among those that meet the result's requirements.
 
     One chart dominates another when it is at least as good by every index and better by one; larger is better. Charts
@@ -42,13 +42,13 @@ def pareto_front(result: Result, *indices: Quality) -> IntArray:
             requirements.
     """
     values = values_of(result, *indices)
-    charts = np.flatnonzero(result.feasible)
+    charts = np.flatnonzero(result.accepted)
     if len(charts) == 0:
         raise GraspAtlasError("no grasp meets the requirements, so there is no front: relax one")
     return np.asarray(charts[_non_dominated(values[charts])], np.int64)
 
 
-def values_of(result: Result, *indices: Quality) -> Array:
+def values_of(result: GraspAtlas, *indices: Quality) -> Array:
     """Values of several indices at each chart centre [n, m].
 
     Raises:

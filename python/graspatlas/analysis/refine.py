@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graspatlas.analysis.climb import MAX_STEPS, Climb, Peak, climb, local_maxima, peaks_of
 from graspatlas.errors import GraspAtlasError
+from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.result.refinement import Refinement
 from graspatlas.support.deadlines import deadline_after
 from graspatlas.support.interrupts import held, stoppable, stopping
 from graspatlas.support.progress import progress_bar
-
-if TYPE_CHECKING:
-    from graspatlas.result.result import Result
 
 __all__ = ["refine"]
 
@@ -29,7 +26,7 @@ MOST_STARTS = 40
 
 @stoppable()
 def refine(
-    result: Result,
+    result: GraspAtlas,
     *,
     all_motions: bool = False,
     max_steps: int = MAX_STEPS,

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from enum import Enum
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +13,11 @@ from scipy.optimize import nnls
 from scipy.spatial import ConvexHull, cKDTree
 
 from graspatlas import _core
+from graspatlas.atlas.status import Audit, Closed, Status
+from graspatlas.atlas.topology import euler_characteristic, facet_ring
 from graspatlas.errors import GraspAtlasError
+from graspatlas.support.arrays import AnyArray, Array, IntArray
+from graspatlas.support.columns import joined, to_frame
 from graspatlas.support.pickling import Light
 from graspatlas.support.validation import number_array, read_only
 from graspatlas.systems.projection import checked_point
@@ -23,10 +26,8 @@ from graspatlas.systems.system import AnySystem
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-__all__ = ["BOX_TAG", "Atlas", "Audit", "Closed", "Status"]
+__all__ = ["BOX_TAG", "Atlas"]
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 #: Facet tag of the initial box; a tag t >= 0 is the neighbour's index, t <= -2 is bound -2 - t.
 BOX_TAG = -1
@@ -38,63 +39,6 @@ SAME_SHEET = 0.01
 LARGEST = 1e100
 #: Facets of a polygon shorter than this share of the radius are left out of the surface's triangulation.
 SHORT_FACET = 0.05
-
-
-class Status(str, Enum):
-    """How the construction of an atlas ended; all but the first are cut short."""
-
-    COMPLETE = "complete"
-    CHART_LIMIT = "cut short: limit of charts"
-    TIME_LIMIT = "cut short: limit of time"
-    MEMORY_LIMIT = "cut short: limit of memory"
-    INTERRUPTED = "cut short: interrupted"
-    BLOCKED = "cut short: steps from some charts failed"
-
-    def __str__(self) -> str:
-        return self.value
-
-
-class Closed(int, Enum):
-    """Why a vertex of a polytope was not expanded; covered: an audit went on there by small steps, to other charts."""
-
-    OPEN = 0
-    BOUNDS = 1
-    CURVATURE = 2
-    NOT_CONVERGED = 3
-    COVERED = 4
-
-
-@dataclass(frozen=True)
-class Audit:
-    """What became of the search for points of the manifold that a complete atlas does not cover.
-
-    The points are those of random walks over the manifold and along its bounds, which begin at charts and then know
-    nothing of them; beside them, every place was looked at where a vertex was closed, and behind every bound that cuts
-    a chart.
-
-    Attributes:
-        points: Points of the last round, all of which a chart covers; 0 where there was none, as for an atlas that was
-            cut short.
-        holes: Charts that were begun at points that none covered, in the rounds before.
-        seconds: Time that it took.
-    """
-
-    points: int
-    holes: int
-    seconds: float
-
-    def share_missing(self, confidence: float = 0.95) -> float:
-        """Largest share of the points that random walks come to that no chart covers, at this confidence.
-
-        If more were missing, all points of the last round would have been covered with a chance below 1 - confidence. A
-        part that no walk can come to, behind a passage much narrower than a chart, does not count.
-
-        Args:
-            confidence: Between 0 and 1.
-        """
-        if not 0.0 < confidence < 1.0:
-            raise GraspAtlasError(f"confidence must lie between 0 and 1, got {confidence!r}")
-        return float(1.0 - (1.0 - confidence) ** (1.0 / self.points)) if self.points else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,9 +291,6 @@ class Atlas(Light):
     def euler_characteristic(self) -> int:
         """Euler characteristic V - E + F of the surface that the charts triangulate; for closed manifolds with k = 2.
 
-        Charts are the vertices, facets that two charts have in common are the edges, and the faces are traced round the
-        charts' polygons, so that the count holds also where four charts meet.
-
         Raises:
             GraspAtlasError: If k is not 2, or the atlas has a boundary or is cut short.
         """
@@ -357,56 +298,15 @@ class Atlas(Light):
             raise GraspAtlasError(f"the Euler characteristic is counted for k = 2, this atlas has k = {self.dimension}")
         if not self.complete or (self.facet_tags < 0).any():
             raise GraspAtlasError("the Euler characteristic needs a complete atlas without boundary")
-        rings, edges = self._rotation_system()
-        seen: set[tuple[int, int, int]] = set()
-        faces = 0
-        for start in [(i, j, turn) for turn in (1, -1) for i in rings for j in rings[i]]:
-            if start in seen:
-                continue
-            faces += 1
-            dart = start
-            while dart not in seen:
-                seen.add(dart)
-                i, j, turn = dart
-                turn *= self._orientation(i, j)
-                ring = rings[j]
-                dart = (j, ring[(ring.index(i) + turn) % len(ring)], turn)
-        # Every face is traced twice, once in each direction.
-        return len(rings) - len(edges) + faces // 2
-
-    def _rotation_system(self) -> tuple[dict[int, list[int]], set[tuple[int, int]]]:
-        """Neighbours of each chart in order round its polygon, joined by facets that both charts have.
-
-        Short facets are left out: near a corner of four charts, seen in four tangent planes, both diagonals may seem to
-        be edges. Leaving out an edge joins two faces and keeps V - E + F.
-        """
-        order = {i: self._facet_ring(i) for i in range(self.n_charts)}
-        edges = {(i, j) for i, ring in order.items() for j in ring if i < j and i in order[j]}
-        rings = {i: [j for j in ring if (min(i, j), max(i, j)) in edges] for i, ring in order.items()}
-        return rings, edges
-
-    def _facet_ring(self, chart: int) -> list[int]:
-        """Neighbours behind the long facets of a polygon, in order round it."""
-        normals, offsets, tags = self.facets(chart)
-        ring = np.argsort(np.arctan2(normals[:, 1], normals[:, 0]))
-        after = np.roll(ring, -1)
-        corners = np.linalg.solve(
-            np.stack([normals[ring], normals[after]], axis=1),
-            np.stack([offsets[ring], offsets[after]], axis=1)[..., None],
-        )[..., 0]
-        lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
-        return [int(tags[f]) for f, length in zip(ring, lengths, strict=True) if length > SHORT_FACET * self.radius]
-
-    def _orientation(self, i: int, j: int) -> int:
-        """1 when the tangent bases of two charts have the same orientation, else -1."""
-        return 1 if np.linalg.det(self.bases[i] @ self.bases[j].T) > 0.0 else -1
+        rings = [facet_ring(*self.facets(chart), SHORT_FACET * self.radius) for chart in range(self.n_charts)]
+        return euler_characteristic(rings, self.bases)
 
     def to_pandas(self, *, volumes: bool = False) -> DataFrame:
         """The charts as a table, one row a chart: centre, residual, neighbours, facets and closed vertices.
 
         Columns are ``x0``, ``x1`` and so on, the numbers of the centre; ``residual``, the largest entry of |R(x)|;
         ``n_neighbours``; ``n_facets``; ``n_vertices``; and how many vertices were not expanded, by reason:
-        ``closed_bounds``, ``closed_curvature``, ``closed_not_converged``.
+        ``closed_bounds``, ``closed_curvature``, ``closed_not_converged``, ``closed_covered``.
 
         Args:
             volumes: Add ``volume``, that of each chart's polytope; slow in high dimensions.
@@ -414,9 +314,24 @@ class Atlas(Light):
         Raises:
             GraspAtlasError: If pandas is not installed.
         """
-        from graspatlas.result.data_frames import atlas_frame  # pandas is slow to import
+        centers = {f"x{i}": column for i, column in enumerate(self.centers.T)}
+        return to_frame(joined(centers, self.chart_columns(volumes)))
 
-        return atlas_frame(self, volumes)
+    def chart_columns(self, volumes: bool = False) -> dict[str, AnyArray]:
+        """What is known of each chart besides its centre, by name; see :meth:`to_pandas`."""
+        n = self.n_charts
+        chart_of_vertex = np.repeat(np.arange(n), np.diff(self.vertex_start))
+        columns: dict[str, AnyArray] = {
+            "residual": self.residuals,
+            "n_neighbours": np.bincount(self.neighbour_pairs.ravel(), minlength=n),
+            "n_facets": np.diff(self.facet_start),
+            "n_vertices": np.diff(self.vertex_start),
+        }
+        for reason in Closed:
+            if reason is not Closed.OPEN:
+                closed = chart_of_vertex[self.vertex_closed == reason.value]
+                columns[f"closed_{reason.name.lower()}"] = np.bincount(closed, minlength=n)
+        return {**columns, "volume": self.volumes} if volumes else columns
 
     def neighbours_to_pandas(self) -> DataFrame:
         """Pairs of neighbouring charts as a table: ``chart``, ``neighbour`` and ``distance``, each pair once.
@@ -426,11 +341,12 @@ class Atlas(Light):
         Raises:
             GraspAtlasError: If pandas is not installed.
         """
-        from graspatlas.result.data_frames import neighbour_frame  # pandas is slow to import
+        pairs, x = self.neighbour_pairs, self.centers
+        distances = [float(np.linalg.norm(self.system.difference(x[a], x[b]))) for a, b in pairs]
+        columns = {"chart": pairs[:, 0], "neighbour": pairs[:, 1], "distance": np.array(distances)}
+        return to_frame(columns, index=None)
 
-        return neighbour_frame(self)
-
-    def to_arrays(self) -> dict[str, Any]:
+    def to_arrays(self) -> dict[str, AnyArray]:
         """All arrays by name, for storing."""
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SCALARS}
 

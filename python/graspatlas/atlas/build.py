@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike
 from typing_extensions import Unpack
 
 from graspatlas import _core
-from graspatlas.atlas.atlas import Atlas, Audit, Status
+from graspatlas.atlas.atlas import Atlas
 from graspatlas.atlas.checkpoints import CheckpointFolder, run_digest
 from graspatlas.atlas.growth import Growth
 from graspatlas.atlas.limits import LimitOptions, Limits
+from graspatlas.atlas.status import Audit, Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.support.arrays import Array
 from graspatlas.support.interrupts import hear, held, keeping, stoppable

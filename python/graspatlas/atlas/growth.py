@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspatlas import _core
-from graspatlas.atlas.atlas import Status
 from graspatlas.atlas.checkpoints import CheckpointFolder
 from graspatlas.atlas.limits import Limits
+from graspatlas.atlas.status import Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.support.interrupts import hear, held, stopping
 from graspatlas.support.progress import QUIET_SECONDS, is_shown, progress_bar

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from graspatlas.atlas.atlas import Status
 from graspatlas.atlas.build import build_atlas
+from graspatlas.atlas.status import Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.problem import Problem
 from graspatlas.requirements.collision import CollisionChecker

@@ -53,7 +53,9 @@ def add_result_commands(commands: Any) -> None:
     )
     out.add_argument("--best", type=int, metavar="N", help="only the N best grasps that meet the requirements")
     out.add_argument("--chart", nargs="+", metavar="CHART", help="only these: numbers of charts, first, best or worst")
-    out.add_argument("--feasible", action="store_true", help="only grasps that meet the result's requirements")
+    out.add_argument(
+        "--accepted", "--feasible", action="store_true", help="only grasps that meet the result's requirements"
+    )
     out.add_argument("--refined", action="store_true", help="put the refined best before the others")
     out.add_argument("--table", type=path_word, metavar="FILE", help="write the table of charts (.csv or .parquet)")
     out.add_argument("--json", action="store_true", help="print one JSON object on standard output")
@@ -83,7 +85,9 @@ def add_result_commands(commands: Any) -> None:
     where = "number of a chart, or first, best or worst"
     way.add_argument("--from", dest="start", default="first", metavar="CHART", help=f"{where}; first by default")
     way.add_argument("--to", dest="end", default="best", metavar="CHART", help=f"{where}; best by default")
-    way.add_argument("--feasible", action="store_true", help="only through grasps that meet the result's requirements")
+    way.add_argument(
+        "--accepted", "--feasible", action="store_true", help="only through grasps that meet the result's requirements"
+    )
     way.add_argument("--csv", type=path_word, metavar="FILE", help="write a table: joints, pose of the object, quality")
     speed = "add times to the table: no joint faster than S [rad/s or m/s], or than the URDF's limits with 'urdf'"
     way.add_argument("--joint-speed", metavar="S", help=speed)
@@ -117,13 +121,13 @@ def _export(options: argparse.Namespace) -> int:
     if options.table and options.table.suffix not in FRAME_ENDINGS:
         raise GraspAtlasError(f"table '{options.table}' must end in {' or '.join(FRAME_ENDINGS)}")
     result = load_result(options.result)
-    if (options.best is not None or options.feasible) and not result.feasible.any():
+    if (options.best is not None or options.accepted) and not result.accepted.any():
         say(f"{result.problem.name}: no grasp meets the requirements, nothing was written", file=sys.stderr)
         return FAILED
     summary: dict[str, Any] = {"problem": result.problem.name, "n_charts": result.atlas.n_charts}
     if options.grasps:
         charts = options.chart and [_chart(result, name) for name in options.chart]
-        chosen = {name: getattr(options, name) for name in ("best", "feasible", "refined")}
+        chosen = {name: getattr(options, name) for name in ("best", "accepted", "refined")}
         count = result.save_grasps(options.grasps, charts=charts, **chosen)
         summary |= {"n_grasps": count, "grasps": str(options.grasps)}
     if options.table:
@@ -158,7 +162,7 @@ def _pareto(options: argparse.Namespace) -> int:
         rows = [{"chart": int(c), "values": v.tolist()} for c, v in zip(front, values, strict=True)]
         say(json.dumps({"indices": names, "front": rows, "knee": None if at is None else int(front[at])}))
         return 0
-    say(f"{result.problem.name}: {len(front)} of {int(result.feasible.sum())} grasps are on the Pareto front")
+    say(f"{result.problem.name}: {len(front)} of {int(result.accepted.sum())} grasps are on the Pareto front")
     say(f"  {'chart':>8} {names[0]:>26} {names[1]:>26}")
     for row, (chart, pair) in enumerate(zip(front, values, strict=True)):
         say(f"  {chart:8} {pair[0]:26.6g} {pair[1]:26.6g}{'  knee' if row == at else ''}")
@@ -171,16 +175,16 @@ def _densify(options: argparse.Namespace) -> int:
     samples = densify(result, options.spacing, share=options.share, progress=True)
     with replaced(folder / "samples.npz") as stream:
         np.savez_compressed(stream, **samples.to_arrays())
-    best = samples.best if samples.feasible.any() else None
+    best = samples.best if samples.accepted.any() else None
     if options.json:
         summary = {
             "n_samples": len(samples),
-            "n_feasible": int(samples.feasible.sum()),
+            "n_accepted": int(samples.accepted.sum()),
             "not_converged": samples.not_converged,
             "outside": samples.outside,
             "complete": samples.complete,
             "best": best and {"quality": best.quality, "chart": best.chart, "x": best.x.tolist()},
-            "best_chart": result.best.quality if result.feasible.any() else None,
+            "best_chart": result.best.quality if result.accepted.any() else None,
         }
         say(json.dumps(summary))
     else:
@@ -197,13 +201,13 @@ def _sample_lines(result: Result, samples: Samples, folder: Path) -> list[str]:
         f"  {samples.outside} were outside the bounds, {samples.not_converged} did not reach the manifold",
     ]
     if result.requirements:
-        lines.append(f"  {samples.feasible.sum()} meet the requirements")
-    if samples.feasible.any():
+        lines.append(f"  {samples.accepted.sum()} meet the requirements")
+    if samples.accepted.any():
         best = samples.best
         lines.append(f"  {quality_name(result.quality)}: best sample {best.quality:.9g} (chart {best.chart})")
     else:
         lines.append("  no best sample: relax a requirement, or fill a larger share")
-    if result.feasible.any():
+    if result.accepted.any():
         lines.append(f"  best centre of a chart {result.best.quality:.9g}")
     return [*lines, f"  written to {folder / 'samples.npz'}"]
 
@@ -216,7 +220,7 @@ def _path(options: argparse.Namespace) -> int:
     if speed is not None:
         speed_limits(result.problem.hand, speed)
     start, end = (_chart(result, name) for name in (options.start, options.end))
-    path = shortest_path(result, start, end, feasible=options.feasible, progress=True)
+    path = shortest_path(result, start, end, accepted=options.accepted, progress=True)
     say(
         f"{result.problem.name}: path of length {path.length:.6g} from chart {start} to chart {end}, {len(path)} points"
     )
@@ -227,7 +231,7 @@ def _path(options: argparse.Namespace) -> int:
         lowest = int(path.qualities.argmin())
         say(f"  {quality_name(result.quality)}: smallest {path.qualities[lowest]:.6g}, at point {lowest}")
     if result.requirements and path.knows_requirements:
-        say(f"  {path.feasible.sum()} of {len(path)} points meet the requirements")
+        say(f"  {path.accepted.sum()} of {len(path)} points meet the requirements")
     from graspatlas.viewer import export_html, save_picture
 
     def save_csv(path: GraspPath, file: Path) -> None:

@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import Unpack
 
-from graspatlas.atlas.atlas import Atlas, Status
+from graspatlas.atlas.atlas import Atlas
 from graspatlas.atlas.limits import check_keywords
+from graspatlas.atlas.status import Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasp
 from graspatlas.optimizer.optimize import optimize
@@ -284,4 +285,4 @@ def _best_quality(result: Result) -> float:
     """The best quality of a component; minus infinity when no grasp meets the requirements."""
     if result.refinement:
         return result.refined_best.quality
-    return result.best.quality if result.feasible.any() else -np.inf
+    return result.best.quality if result.accepted.any() else -np.inf

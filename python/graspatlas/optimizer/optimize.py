@@ -103,7 +103,7 @@ def optimize(
         check_atlas_of(problem, options, atlas)
     with keeping(atlas=atlas):
         result = reading.at(problem, atlas)
-        if refine and result.feasible.any() and not stopping():
+        if refine and result.accepted.any() and not stopping():
             with keeping(result=result):
                 found = climb_peaks(
                     result,

@@ -56,7 +56,7 @@ class Reading:
         """
         start = time.perf_counter()
         grasps = Grasps(problem, atlas.centers, atlas.system, np.arange(atlas.n_charts))  # type: ignore[arg-type]
-        feasible, refused = screen(self.requirements, grasps)
+        accepted, rejected = screen(self.requirements, grasps)
         first, *others = self.indices
         qualities = evaluate(first, grasps)
         values = {quality_name(other): evaluate(other, grasps) for other in others}
@@ -67,8 +67,8 @@ class Reading:
             qualities=qualities,
             quality_seconds=time.perf_counter() - start,
             requirements=tuple(self.requirements),
-            feasible=feasible,
-            refused=refused,
+            accepted=accepted,
+            rejected=rejected,
             others=values,
         )
 

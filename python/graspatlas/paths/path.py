@@ -2,7 +2,7 @@
 
 ::
 
-    path = ga.shortest_path(result, 0, feasible=True)     # from chart 0 to the best, through grasps that hold only
+    path = ga.shortest_path(result, 0, accepted=True)     # from chart 0 to the best, through grasps that hold only
     path.length, path.x, path.grasps, path.qualities      # every point keeps all contacts
     path.save_csv("path.csv")                             # a joint trajectory
     ga.export_html(path, "path.html")                     # a page with a slider
@@ -23,10 +23,12 @@ from graspatlas.atlas.atlas import Atlas
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.paths.time_parametrization import URDF, passing_times
 from graspatlas.quality.evaluation import INDICES, evaluate
-from graspatlas.result.result import Result
+from graspatlas.requirements.lost import Lost
+from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.support.columns import joined, pose_columns
 from graspatlas.support.files import write_csv
 from graspatlas.support.pickling import Light
+from graspatlas.support.renamed import renamed_attribute
 
 __all__ = ["GraspPath", "Path"]
 
@@ -98,7 +100,7 @@ class GraspPath(Path):
         result: The result that it lies on; see :class:`Path` for the others.
     """
 
-    result: Result
+    result: GraspAtlas
     __repr__ = Path.__repr__
 
     @cached_property
@@ -116,13 +118,15 @@ class GraspPath(Path):
         return evaluate(self.result.quality, self.grasps)
 
     @cached_property
-    def feasible(self) -> Flags:
+    def accepted(self) -> Flags:
         """Whether each point meets the result's requirements [n].
 
         Raises:
             GraspAtlasError: If a requirement was a callable, which is not stored with a result.
         """
         return self.result.meets(self.x)
+
+    feasible = renamed_attribute("feasible", "accepted")
 
     @property
     def knows_quality(self) -> bool:
@@ -132,7 +136,7 @@ class GraspPath(Path):
     @property
     def knows_requirements(self) -> bool:
         """False when a requirement was a callable that was lost when the result was stored."""
-        return not any(isinstance(requirement, str) for requirement in self.result.requirements)
+        return not any(isinstance(requirement, Lost) for requirement in self.result.requirements)
 
     @cached_property
     def joint_positions(self) -> dict[str, Array]:

@@ -21,8 +21,9 @@ from graspatlas.atlas.atlas import Atlas
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasp
 from graspatlas.paths.path import GraspPath, Path
-from graspatlas.result.result import Result
+from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.support.interrupts import stoppable
+from graspatlas.support.renamed import renamed_keyword
 from graspatlas.support.validation import number_array, positive
 from graspatlas.systems.geodesic import BOUND_TOLERANCE, Allowed, arc_lengths, bridge, evenly, shorten
 
@@ -47,11 +48,11 @@ SAME = 1e-9
 
 @overload
 def shortest_path(
-    on: Result,
+    on: GraspAtlas,
     start: End = 0,
     end: End | None = None,
     *,
-    feasible: bool = False,
+    accepted: bool = False,
     step: float | None = None,
     progress: bool | None = None,
 ) -> GraspPath: ...
@@ -63,33 +64,34 @@ def shortest_path(
     start: End = 0,
     end: End | None = None,
     *,
-    feasible: bool = False,
+    accepted: bool = False,
     step: float | None = None,
     progress: bool | None = None,
 ) -> Path: ...
 
 
+@renamed_keyword("feasible", "accepted")
 @stoppable()
 def shortest_path(
-    on: Result | Atlas,
+    on: GraspAtlas | Atlas,
     start: End = 0,
     end: End | None = None,
     *,
-    feasible: bool = False,
+    accepted: bool = False,
     step: float | None = None,
     progress: bool | None = None,
 ) -> Path:
     """The shortest path between two points of an atlas, all of it on the manifold and inside its bounds.
 
     Dijkstra's algorithm finds the way through the charts; the path is then pulled tight on the manifold. It is a
-    geodesic, or hugs bounds and what is not feasible: the shortest of all that can be reached from the way through the
+    geodesic, or hugs bounds and what is not accepted: the shortest of all that can be reached from the way through the
     charts without lifting over a hole. Ctrl-C keeps the path as it is then.
 
     Args:
         on: A result; or an atlas, of any system.
         start: A chart's number, a grasp, or a point of the manifold [configuration_size]; the first grasp by default.
         end: Likewise; the best grasp by default.
-        feasible: Whether every point must meet the result's requirements. They are asked at the points of the path, not
+        accepted: Whether every point must meet the result's requirements. They are asked at the points of the path, not
             between them.
         step: Longest distance between neighbouring points [units of the tangent space]; a tenth of the chart radius by
             default.
@@ -102,20 +104,20 @@ def shortest_path(
         GraspAtlasError: If start or end is no chart, not on the manifold, not in the atlas or not feasible, or no path
             leads from one to the other.
     """
-    result = on if isinstance(on, Result) else None
-    if not isinstance(on, Result | Atlas):
+    result = on if isinstance(on, GraspAtlas) else None
+    if not isinstance(on, GraspAtlas | Atlas):
         raise GraspAtlasError(f"a path needs a graspatlas.Result or an Atlas, got {type(on).__name__}")
-    atlas = on.atlas if isinstance(on, Result) else on
+    atlas = on.atlas if isinstance(on, GraspAtlas) else on
     longest = _step(atlas, step)
-    if result is None and feasible:
-        raise GraspAtlasError("an atlas has no requirements; give the result, or leave out feasible=True")
+    if result is None and accepted:
+        raise GraspAtlasError("an atlas has no requirements; give the result, or leave out accepted=True")
     if result is None and end is None:
         raise GraspAtlasError("an atlas has no best grasp; give end")
     ends = [_End.of(atlas, result, "start", start)]
     ends.append(_End.of(atlas, result, "end", result.best.chart if result and end is None else end))
     open_charts, allowed = np.ones(atlas.n_charts, bool), None
-    if result and feasible and result.requirements:
-        open_charts, allowed = result.feasible, result.meets
+    if result and accepted and result.requirements:
+        open_charts, allowed = result.accepted, result.meets
         for e in ends:
             e.must_meet(result)
     if float(np.linalg.norm(atlas.system.difference(ends[0].x, ends[1].x))) <= SAME:
@@ -157,7 +159,7 @@ class _End:
     at_centre: bool
 
     @classmethod
-    def of(cls, atlas: Atlas, result: Result | None, name: str, value: object) -> _End:
+    def of(cls, atlas: Atlas, result: GraspAtlas | None, name: str, value: object) -> _End:
         """The end that the caller named."""
         if isinstance(value, Integral) and not isinstance(value, bool):
             chart = int(value)
@@ -177,19 +179,19 @@ class _End:
         near = float(np.linalg.norm(atlas.system.difference(atlas.centers[chart], x))) <= SAME
         return cls(name, x, chart, near)
 
-    def must_meet(self, result: Result) -> None:
+    def must_meet(self, result: GraspAtlas) -> None:
         """Make sure that the grasp meets the requirements."""
-        if self.at_centre and result.feasible[self.chart]:
+        if self.at_centre and result.accepted[self.chart]:
             return
         if self.at_centre or not result.meets(self.x[None])[0]:
             where = f"chart {self.chart}" if self.at_centre else f"in chart {self.chart}"
             raise GraspAtlasError(
-                f"{self.name} ({where}) does not meet the requirements, which {result.feasible.sum()} charts do: see "
-                "result.feasible, or leave out feasible=True"
+                f"{self.name} ({where}) does not meet the requirements, which {result.accepted.sum()} charts do: see "
+                "result.accepted, or leave out accepted=True"
             )
 
 
-def _check_on_manifold(atlas: Atlas, result: Result | None, name: str, x: Array) -> None:
+def _check_on_manifold(atlas: Atlas, result: GraspAtlas | None, name: str, x: Array) -> None:
     if not np.isfinite(x).all():
         raise GraspAtlasError(f"{name} holds a number that is not finite")
     residual = np.abs(atlas.system.evaluate_residual(x)).max(initial=0.0)
@@ -286,5 +288,5 @@ class _Roads:
         return GraspAtlasError(
             f"start and end are not connected: the {self.open[: self.atlas.n_charts].sum()} {kind} form {pieces} "
             f"pieces{parted}, start lies in one of {sizes[0]} charts, end in one of {sizes[1]}; choose an end in "
-            "start's piece" + (", or leave out feasible=True" if self.allowed is not None else "")
+            "start's piece" + (", or leave out accepted=True" if self.allowed is not None else "")
         )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 
-from graspatlas.atlas.atlas import Status
 from graspatlas.atlas.build import build_atlas
+from graspatlas.atlas.status import Status
 from graspatlas.reproduce.climbing import MAX_STEPS, Study, study
 from graspatlas.reproduce.findings import (
     add_box_starts,
@@ -164,7 +164,7 @@ def schunk_can(progress: bool) -> Section:
 def _add_holding(section: Section, result: Result, progress: bool) -> None:
     """The best of the grasps that hold: force closure, and no collision; and local searches among them."""
     held = holding(result)
-    n = int(held.feasible.sum())
+    n = int(held.accepted.sum())
     run_name = "force closure at friction 0.5, no collision"
     section.numbers.append(Number(run_name, "charts that meet both", None, n))
     if n == 0:

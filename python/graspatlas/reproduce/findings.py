@@ -116,7 +116,7 @@ def add_holding_of_best(section: Section, result: Result) -> None:
     stated = screen(result.problem.requirements, grasps)[0]
     if stated.any():
         names = ", ".join(map(str, result.problem.requirements))
-        best = replace(result, requirements=tuple(result.problem.requirements), feasible=stated).best.quality
+        best = replace(result, requirements=tuple(result.problem.requirements), accepted=stated).best.quality
         words += (
             f" {stated.sum()} charts meet what the bundled problem asks for outside this page ({names}), the best of "
             f"them with an index of {best:.4g}."
@@ -128,8 +128,8 @@ def holding(result: Result) -> Result:
     """The same result when a grasp must be force-closed and free of collision."""
     requirements = (ForceClosure(FRICTION), CollisionFree())
     grasps = Grasps(result.problem, result.atlas.centers, result.atlas.system)  # type: ignore[arg-type]
-    feasible, refused = screen(requirements, grasps)
-    return replace(result, requirements=requirements, feasible=feasible, refused=refused)
+    accepted, rejected = screen(requirements, grasps)
+    return replace(result, requirements=requirements, accepted=accepted, rejected=rejected)
 
 
 def add_box_starts(section: Section, result: Result, words: str) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from graspatlas.analysis.climb import local_maxima
-from graspatlas.atlas.atlas import Status
+from graspatlas.atlas.status import Status
 from graspatlas.optimizer.optimize import optimize
 from graspatlas.problems import load_problem
 from graspatlas.reproduce.published import PUBLISHED, WHY, Published

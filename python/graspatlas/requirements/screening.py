@@ -210,9 +210,9 @@ Require = Requirement | Callable[[Any], Any]
 REQUIREMENTS: dict[str, type[Requirement]] = {r.name: r for r in (JointMargin, ForceClosure, CollisionFree)}
 
 
-def requirement_name(requirement: Require | str) -> str:
+def requirement_name(requirement: Require) -> str:
     """The requirement as text; :func:`parse_requirement` reads those of the named ones."""
-    if isinstance(requirement, Requirement | str):
+    if isinstance(requirement, Requirement):
         return str(requirement)
     return getattr(requirement, "__name__", type(requirement).__name__)
 
@@ -283,7 +283,7 @@ def screen(requirements: Sequence[Require], grasps: Grasps) -> tuple[Flags, dict
         grasps: The grasps.
 
     Returns:
-        Flags [n], and how many grasps each requirement refused.
+        Flags [n], and how many grasps each requirement rejected.
 
     Raises:
         GraspAtlasError: If a function raises or returns anything but True and False; see
@@ -291,14 +291,14 @@ def screen(requirements: Sequence[Require], grasps: Grasps) -> tuple[Flags, dict
     """
     check_requirements(requirements)
     left = np.arange(len(grasps))
-    refused: dict[str, int] = {}
+    rejected: dict[str, int] = {}
     for requirement in sorted(requirements, key=lambda r: r.cost if isinstance(r, Requirement) else 1):
         met = _met(requirement, Grasps(grasps.problem, grasps.x[left], grasps.system, grasps.charts[left]))
-        refused[requirement_name(requirement)] = int((~met).sum())
+        rejected[requirement_name(requirement)] = int((~met).sum())
         left = left[met]
     flags = np.zeros(len(grasps), bool)
     flags[left] = True
-    return flags, refused
+    return flags, rejected
 
 
 def _met(requirement: Require, grasps: Grasps) -> Flags:

@@ -8,32 +8,31 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
+from graspatlas.grasps.columns import contact_columns, grasp_columns
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.hand.urdf import root_link
 from graspatlas.quality.evaluation import INDICES, evaluate, quality_name
 from graspatlas.requirements.screening import requirement_name
-from graspatlas.support.columns import joined, pose_columns
+from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.support.columns import joined
 from graspatlas.support.files import replaced, write_csv
 from graspatlas.support.validation import whole
+from graspatlas.version import __version__
 
-if TYPE_CHECKING:
-    from graspatlas.result.result import Result
-
-__all__ = ["ENDINGS", "FORMAT", "FORMAT_VERSION", "Selection", "grasp_columns", "save_grasps", "select"]
+__all__ = ["ENDINGS", "FORMAT", "FORMAT_VERSION", "Selection", "save_grasps", "select"]
 
 Array = NDArray[np.float64]
 
 #: What a file of grasps may end in.
 ENDINGS = (".csv", ".json")
 FORMAT = "graspatlas grasps"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,20 +43,20 @@ class Selection:
         grasps: The grasps [n].
         charts: Chart of each [n]; of the refined best the one its climb began from.
         refined: True for the refined best, which is no chart's centre [n].
-        feasible: Whether each meets the result's requirements [n].
+        accepted: Whether each meets the result's requirements [n].
         indices: Values of the result's indices by name, [n] each; NaN where one was not stored.
     """
 
     grasps: Grasps
     charts: NDArray[np.int64]
     refined: NDArray[np.bool_]
-    feasible: NDArray[np.bool_]
+    accepted: NDArray[np.bool_]
     indices: dict[str, Array]
 
     def columns(self) -> dict[str, Any]:
         """Columns of a flat table: chart, flags, indices, joints, poses and contacts."""
-        flags = {"chart": self.charts, "refined": self.refined, "feasible": self.feasible}
-        return joined(flags, self.indices, grasp_columns(self.grasps), _contact_columns(self.grasps))
+        flags = {"chart": self.charts, "refined": self.refined, "accepted": self.accepted}
+        return joined(flags, self.indices, grasp_columns(self.grasps), contact_columns(self.grasps))
 
     def records(self) -> list[dict[str, Any]]:
         """One table a grasp, as the JSON file has it."""
@@ -70,7 +69,7 @@ class Selection:
             {
                 "chart": int(self.charts[i]),
                 "refined": bool(self.refined[i]),
-                "feasible": bool(self.feasible[i]),
+                "accepted": bool(self.accepted[i]),
                 "indices": {name: _finite(values[i]) for name, values in self.indices.items()},
                 "joints": dict(zip(grasps.joints, joints[i], strict=True)),
                 "palm_in_object": {"xyz": palm_xyz[i], "quat_xyzw": palm_quat[i]},
@@ -85,16 +84,16 @@ class Selection:
 
 
 def select(
-    result: Result,
+    result: GraspAtlas,
     *,
     charts: Sequence[int] | None = None,
     best: int | None = None,
-    feasible: bool = False,
+    accepted: bool = False,
     refined: bool = False,
 ) -> Selection:
     """Choose grasps of a result; see :meth:`graspatlas.Result.save_grasps` for the arguments and errors."""
-    if charts is not None and (best is not None or feasible):
-        raise GraspAtlasError("give either charts, or best and feasible")
+    if charts is not None and (best is not None or accepted):
+        raise GraspAtlasError("give either charts, or best and accepted")
     if refined and result.refinement is None:
         raise GraspAtlasError("this result was not refined: give optimize refine=True")
     if charts is not None:
@@ -104,10 +103,10 @@ def select(
     elif best is not None:
         rows = _best(result, best)
     else:
-        rows = result.candidates() if feasible else np.arange(result.atlas.n_charts)
+        rows = result.candidates() if accepted else np.arange(result.atlas.n_charts)
     names = [quality_name(result.quality), *result.others]
     values = [values[rows] for values in (result.qualities, *result.others.values())]
-    X, flags, numbers = result.atlas.centers[rows], result.feasible[rows], rows.astype(np.int64)
+    X, flags, numbers = result.atlas.centers[rows], result.accepted[rows], rows.astype(np.int64)
     if refined:
         top = result.refined_best
         at_top = [np.array([top.quality]), *(_at(result, top.x, name) for name in result.others)]
@@ -117,12 +116,12 @@ def select(
         grasps=Grasps(result.problem, X.reshape(-1, result.atlas.centers.shape[1])),
         charts=numbers,
         refined=np.arange(len(numbers)) < refined,
-        feasible=flags,
+        accepted=flags,
         indices=dict(zip(names, values, strict=True)),
     )
 
 
-def _best(result: Result, count: int) -> NDArray[np.int64]:
+def _best(result: GraspAtlas, count: int) -> NDArray[np.int64]:
     """The best charts that meet the requirements, the best first; of equals the first."""
     whole(count, "best")
     candidates = result.candidates()
@@ -130,41 +129,16 @@ def _best(result: Result, count: int) -> NDArray[np.int64]:
     return np.asarray(candidates[order[:count]], np.int64)
 
 
-def _at(result: Result, x: Array, name: str) -> Array:
+def _at(result: GraspAtlas, x: Array, name: str) -> Array:
     """Value of an index at a refined grasp [1]; NaN when it was a callable, which is not stored."""
     if name not in INDICES:
         return np.array([np.nan])
-    system: _core.GraspSystem = result.atlas.system  # type: ignore[assignment]
-    if result.refinement is not None and result.refinement.all_motions:
-        system = result.problem.full_system
+    refined_in_F = result.refinement is not None and result.refinement.all_motions
+    system = result.problem.full_system if refined_in_F else result.system
     return evaluate(name, Grasps(result.problem, x, system))
 
 
-def grasp_columns(grasps: Grasps) -> dict[str, Array]:
-    """Columns of joints by name [rad or m], and of the poses of palm and object in one another's frames.
-
-    Raises:
-        GraspAtlasError: If a joint has the name of another column.
-    """
-    return joined(
-        grasps.joint_positions,
-        pose_columns("palm", grasps.palm_xyz, grasps.palm_quat_xyzw),
-        pose_columns("object", grasps.object_xyz, grasps.object_quat_xyzw),
-    )
-
-
-def _contact_columns(grasps: Grasps) -> dict[str, Any]:
-    """Columns of each contact: its frame, its point and the object's outward normal, in the object's frame."""
-    points, normals = grasps.contact_points_in_object, grasps.contact_normals_in_object
-    columns: dict[str, Any] = {}
-    for i, frame in enumerate(grasps.contact_frames):
-        columns[f"contact{i}_frame"] = [frame] * len(grasps)
-        columns |= {f"contact{i}_{axis}": points[:, i, a] for a, axis in enumerate("xyz")}
-        columns |= {f"contact{i}_n{axis}": normals[:, i, a] for a, axis in enumerate("xyz")}
-    return columns
-
-
-def save_grasps(result: Result, path: str | os.PathLike[str], **choice: Any) -> int:
+def save_grasps(result: GraspAtlas, path: str | os.PathLike[str], **choice: Any) -> int:
     """Write grasps of a result; see :meth:`graspatlas.Result.save_grasps`.
 
     Args:
@@ -189,10 +163,8 @@ def save_grasps(result: Result, path: str | os.PathLike[str], **choice: Any) -> 
     return len(selection.grasps)
 
 
-def _header(result: Result, selection: Selection) -> dict[str, Any]:
+def _header(result: GraspAtlas, selection: Selection) -> dict[str, Any]:
     """What holds for all grasps of a file."""
-    from graspatlas.version import __version__
-
     problem = result.problem
     return {
         "format": FORMAT,

@@ -6,28 +6,28 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graspatlas.atlas.atlas import LARGEST, Atlas, Audit, Status
+from graspatlas.atlas.atlas import LARGEST, Atlas
+from graspatlas.atlas.status import Audit, Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.problem import Problem
 from graspatlas.quality.evaluation import quality_name
+from graspatlas.requirements.lost import Lost
 from graspatlas.requirements.screening import Require, parse_requirement, requirement_name
+from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.result.refinement import Refinement
 from graspatlas.support.archives import DamagedArchive, read_arrays
 from graspatlas.support.files import is_folder, opened, replaced, stated_path
 from graspatlas.support.validation import number, shown
 
-if TYPE_CHECKING:
-    from graspatlas.result.result import Result
-
 __all__ = ["read_result", "save_result"]
 
 FORMAT = "graspatlas result"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 #: How far a stored quaternion may be from length one.
 UNIT_TOLERANCE = 1e-6
 
@@ -35,7 +35,7 @@ _REFINEMENT_FLAGS = ("all_motions", "complete")
 _REFINEMENT_ARRAYS = tuple(f.name for f in fields(Refinement) if f.name not in _REFINEMENT_FLAGS)
 
 
-def save_result(result: Result, path: str | os.PathLike[str]) -> None:
+def save_result(result: GraspAtlas, path: str | os.PathLike[str]) -> None:
     """Write a result to one file; see :meth:`graspatlas.Result.save`.
 
     Args:
@@ -59,21 +59,20 @@ def save_result(result: Result, path: str | os.PathLike[str]) -> None:
         "quality": quality_name(result.quality),
         "quality_seconds": result.quality_seconds,
         "requirements": [requirement_name(r) for r in result.requirements],
-        "refused": dict(result.refused),
+        "rejected": dict(result.rejected),
         "others": list(result.others),
     }
     extra: dict[str, Any] = {f"other_{i}": values for i, values in enumerate(result.others.values())}
     if result.refinement is not None:
         header["refinement"] = {name: getattr(result.refinement, name) for name in _REFINEMENT_FLAGS}
         extra |= {f"refined_{name}": getattr(result.refinement, name) for name in _REFINEMENT_ARRAYS}
+    arrays: dict[str, Any] = {"qualities": result.qualities, "accepted": result.accepted, **extra}
+    arrays |= result.atlas.to_arrays()
     with replaced(path) as stream:
         np.savez(  # compression would take longer than the atlas
             stream,
             header=json.dumps(header),
-            qualities=result.qualities,
-            feasible=result.feasible,
-            **extra,
-            **result.atlas.to_arrays(),
+            **arrays,
         )
 
 
@@ -123,7 +122,7 @@ def _parts(header: Mapping[str, Any], arrays: dict[str, Any], source: os.PathLik
     """Attributes of a result, once all of them are sound."""
     try:
         problem = _with_torque_length(Problem.from_dict(header["problem"]), header)
-        qualities, feasible = arrays.pop("qualities"), arrays.pop("feasible")
+        qualities, accepted = arrays.pop("qualities"), arrays.pop("accepted")
         others = {str(name): arrays.pop(f"other_{i}") for i, name in enumerate(header.get("others", []))}
         refinement = _refinement(header.get("refinement"), arrays, problem)
         atlas = Atlas(
@@ -136,8 +135,8 @@ def _parts(header: Mapping[str, Any], arrays: dict[str, Any], source: os.PathLik
             **arrays,
         )
         atlas.check_arrays()
-        if qualities.shape != (atlas.n_charts,) or feasible.shape != qualities.shape or feasible.dtype != bool:
-            raise GraspAtlasError("qualities and feasible need one entry a chart")
+        if qualities.shape != (atlas.n_charts,) or accepted.shape != qualities.shape or accepted.dtype != bool:
+            raise GraspAtlasError("qualities and accepted need one entry a chart")
         for values in (qualities, *others.values()):
             if values.shape != qualities.shape or values.dtype.kind != "f" or np.isnan(values).any():
                 raise GraspAtlasError("qualities must be numbers, one a chart")
@@ -150,8 +149,8 @@ def _parts(header: Mapping[str, Any], arrays: dict[str, Any], source: os.PathLik
             "qualities": qualities,
             "quality_seconds": number(header["quality_seconds"], "quality_seconds"),
             "requirements": tuple(_stored_requirement(str(text)) for text in header["requirements"]),
-            "feasible": feasible,
-            "refused": {str(name): int(count) for name, count in header["refused"].items()},
+            "accepted": accepted,
+            "rejected": {str(name): int(count) for name, count in header["rejected"].items()},
             "others": others,
             "refinement": refinement,
         }
@@ -236,9 +235,9 @@ def _sound(name: str, array: Any) -> bool:
     return bool((~np.isnan(array) if name == "qualities" else np.isfinite(array)).all())
 
 
-def _stored_requirement(text: str) -> Require | str:
-    """The requirement of a name; the name alone of a callable, which is not stored."""
+def _stored_requirement(text: str) -> Require:
+    """The requirement of a name; of a function, which is not stored, what stands for it."""
     try:
         return parse_requirement(text)
     except GraspAtlasError:
-        return text
+        return Lost(text)

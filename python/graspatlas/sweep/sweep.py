@@ -364,13 +364,13 @@ def _values(result: Result) -> dict[str, Any]:
         "error": "",
         "is_global": result.is_global,
         "n_charts": result.atlas.n_charts,
-        "n_feasible": int(result.feasible.sum()),
+        "n_accepted": int(result.accepted.sum()),
         "seconds_atlas": result.atlas.seconds,
         "seconds_quality": result.quality_seconds,
         "max_residual": float(result.atlas.residuals.max()),
         "quality_at_x1": float(result.qualities[0]),
     }
-    if not result.feasible.any():
+    if not result.accepted.any():
         return values
     best = result.refined_best if result.refinement else result.best
     return {

@@ -16,7 +16,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.quality.evaluation import quality_name
 from graspatlas.result.result import Result
 from graspatlas.viewer.figures.polygons import Coordinates, chart_polygons, default_coordinates, open_charts
-from graspatlas.viewer.figures.style import BLUE, INK, PAGE, RED, REFUSED, SINGULAR, Picture, styled
+from graspatlas.viewer.figures.style import BLUE, INK, PAGE, RED, REJECTED, SINGULAR, Picture, styled
 from graspatlas.viewer.figures.surface import View, add_axes, add_polygons, quality_colours, scale_of
 
 __all__ = ["VIEWS", "AtlasDrawing", "plot_atlas", "plot_growth"]
@@ -55,11 +55,11 @@ class AtlasDrawing:
         self.values = self._checked(values if values is not None or isinstance(source, Atlas) else source.qualities)
         self.centers = self.coordinates.of(self.atlas.centers)
         kept = isinstance(source, Result) and values is None
-        self.refused = ~source.feasible if kept else np.zeros(self.atlas.n_charts, bool)  # type: ignore[union-attr]
+        self.rejected = ~source.accepted if kept else np.zeros(self.atlas.n_charts, bool)  # type: ignore[union-attr]
         self.polygons = chart_polygons(self.atlas, self.coordinates) if self.atlas.dimension == 2 else None
         self.scale = None
         if self.values is not None:
-            shown = self.values if self.refused.all() else self.values[~self.refused]
+            shown = self.values if self.rejected.all() else self.values[~self.rejected]
             self.scale = scale_of(shown, singular, logarithmic)
 
     def _checked(self, values: ArrayLike | None) -> Array | None:
@@ -78,7 +78,7 @@ class AtlasDrawing:
         axes = add_axes(figure, place, self.coordinates, points, view)
         colours: Any = BLUE
         if self.values is not None and self.scale is not None:
-            colours = quality_colours(self.values, self.scale, self.singular, self.refused)
+            colours = quality_colours(self.values, self.scale, self.singular, self.rejected)
         if self.polygons:
             add_polygons(axes, self.polygons, colours, edge=0.25 if len(self.polygons) < 3000 else 0.12)
         else:
@@ -199,7 +199,7 @@ def _add_legend(figure: Any, drawing: AtlasDrawing, *, with_best: bool) -> None:
         marks.append(Line2D([], [], linestyle="none", label="best", **star))
     if drawing.values is not None and (drawing.values < drawing.singular).any():
         marks.append(Patch(facecolor=SINGULAR, label="singular"))
-    if drawing.refused.any():
-        marks.append(Patch(facecolor=REFUSED, label="requirements not met"))
+    if drawing.rejected.any():
+        marks.append(Patch(facecolor=REJECTED, label="requirements not met"))
     if marks:
         figure.legend(handles=marks, loc="lower center", bbox_to_anchor=(0.44, 0.0), ncols=3, columnspacing=1.4)

@@ -54,8 +54,8 @@ def plot_best_and_worst(
         drawing.add_colour_bar(figure, (0.36, 0.135, 0.28, 0.018), label, orientation="horizontal")
         _draw_grasps(figure, result)
         figure.text(0.5, 0.955, f"{result.atlas.n_charts} charts; star: best, triangle: worst", ha="center")
-        if drawing.refused.any():
-            figure.text(0.5, 0.915, f"grey: {int(drawing.refused.sum())} refused", ha="center", fontsize=8.0)
+        if drawing.rejected.any():
+            figure.text(0.5, 0.915, f"grey: {int(drawing.rejected.sum())} rejected", ha="center", fontsize=8.0)
     return figure
 
 

@@ -14,7 +14,7 @@ from graspatlas.quality.evaluation import Quality, quality_name
 from graspatlas.result.result import Result
 from graspatlas.viewer.figures.planar import draw_planar_grasp
 from graspatlas.viewer.figures.portrait import common_direction, portrait
-from graspatlas.viewer.figures.style import BLUE, INK, PAGE, RED, REFUSED, Picture, readable, styled
+from graspatlas.viewer.figures.style import BLUE, INK, PAGE, RED, REJECTED, Picture, readable, styled
 
 __all__ = ["plot_pareto"]
 
@@ -64,7 +64,7 @@ def plot_pareto(result: Result, first: Quality, second: Quality) -> Picture:
         _mark(axes, values[0], marker="s", ms=4.6, mfc="white", label="first grasp")
         for portrayed in shown:
             _mark(axes, values[portrayed.chart], **portrayed.symbol)
-        within = np.vstack([values[result.feasible], values[:1]])
+        within = np.vstack([values[result.accepted], values[:1]])
         for axis, name, column in zip("xy", names, within.T, strict=True):
             _scale(axes, axis, column)
             getattr(axes, f"set_{axis}label")(name)
@@ -96,11 +96,11 @@ def _chosen(values: Array, front: NDArray[np.int64], names: list[str]) -> list[_
 
 def _draw_dots(axes: Any, result: Result, values: Array) -> None:
     """All charts: those that meet the requirements over the pale ones that do not."""
-    kept = result.feasible
+    kept = result.accepted
     dots: dict[str, Any] = {"ls": "none", "marker": "o", "mew": 0.0, "rasterized": True}
     axes.plot(*values[kept].T, color=BLUE, ms=2.2, alpha=0.75, zorder=2, label="grasps", **dots)
     if not kept.all():
-        axes.plot(*values[~kept].T, color=REFUSED, ms=1.7, zorder=1, label="requirements not met", **dots)
+        axes.plot(*values[~kept].T, color=REJECTED, ms=1.7, zorder=1, label="requirements not met", **dots)
 
 
 def _mark(axes: Any, point: Array, **symbol: Any) -> None:

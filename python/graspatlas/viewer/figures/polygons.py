@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from graspatlas.atlas.atlas import Atlas, Closed
+from graspatlas.atlas.atlas import Atlas
+from graspatlas.atlas.status import Closed
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.problem.problem import Problem

@@ -14,7 +14,7 @@ from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-__all__ = ["BLUE", "COLUMN", "INK", "PAGE", "QUALITY", "RED", "REFUSED", "SINGULAR", "Picture", "readable", "styled"]
+__all__ = ["BLUE", "COLUMN", "INK", "PAGE", "QUALITY", "RED", "REJECTED", "SINGULAR", "Picture", "readable", "styled"]
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ COLUMN, PAGE = 3.5, 7.16
 #: Colours: ink of lines and letters, singular grasps, charts under expansion, and bounded charts (the paper's Fig. 7).
 INK, SINGULAR, RED, BLUE = "#1c1c1c", "#000000", "#c8452f", "#4f7fb5"
 #: Colour of charts that do not meet the requirements.
-REFUSED = "#cfcfcf"
+REJECTED = "#cfcfcf"
 
 STYLE: dict[str, Any] = {
     "font.family": "STIXGeneral",

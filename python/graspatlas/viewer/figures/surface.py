@@ -12,7 +12,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 from numpy.typing import NDArray
 
 from graspatlas.viewer.figures.polygons import Coordinates
-from graspatlas.viewer.figures.style import INK, QUALITY, REFUSED, SINGULAR
+from graspatlas.viewer.figures.style import INK, QUALITY, REJECTED, SINGULAR
 
 __all__ = ["View", "add_axes", "add_polygons", "quality_colours", "scale_of"]
 
@@ -52,11 +52,11 @@ def scale_of(values: Array, singular: float, logarithmic: bool | None) -> Scalar
     return ScalarMappable(norm=norm, cmap=QUALITY)
 
 
-def quality_colours(values: Array, scale: ScalarMappable, singular: float, refused: NDArray[np.bool_]) -> Array:
-    """Colours of qualities [n, 4]: red to green, black when singular, and grey when refused."""
+def quality_colours(values: Array, scale: ScalarMappable, singular: float, rejected: NDArray[np.bool_]) -> Array:
+    """Colours of qualities [n, 4]: red to green, black when singular, and grey when rejected."""
     colours = np.asarray(scale.to_rgba(values))
     colours[values < singular] = to_rgba(SINGULAR)
-    colours[refused] = to_rgba(REFUSED)
+    colours[rejected] = to_rgba(REJECTED)
     return colours
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from graspatlas.paths.path import GraspPath
 from graspatlas.quality.evaluation import INDICES, quality_name
 from graspatlas.requirements.screening import requirement_name
-from graspatlas.result.result import Result
+from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.viewer.scene.scene import COLOURS, Colour, Exhibit
 
 __all__ = ["Caption", "caption", "film_title", "index_name", "legend", "subtitle"]
@@ -31,7 +31,7 @@ class Caption:
     motion: str
 
 
-def caption(result: Result, exhibit: Exhibit) -> Caption:
+def caption(result: GraspAtlas, exhibit: Exhibit) -> Caption:
     """What is written beside one of the grasps."""
     axes = [1000.0 * axis for axis in exhibit.semi_axes[: 3 if len(exhibit.grasp.G) == 6 else 2]]
     reach = ", ".join(f"{axis if axis > ROUNDING else 0.0:.3g}" for axis in axes)
@@ -43,12 +43,12 @@ def caption(result: Result, exhibit: Exhibit) -> Caption:
     )
 
 
-def index_name(result: Result) -> str:
+def index_name(result: GraspAtlas) -> str:
     """Name of the quality index, in words."""
     return quality_name(result.quality).replace("_", " ")
 
 
-def subtitle(result: Result) -> str:
+def subtitle(result: GraspAtlas) -> str:
     """The problem, the size of its atlas, whether that is complete, and the unit."""
     name = quality_name(result.quality)
     known = name in INDICES and result.quality in (name, INDICES[name])
@@ -56,7 +56,7 @@ def subtitle(result: Result) -> str:
     those = ""
     if result.requirements:
         names = ", ".join(requirement_name(r).split(":")[0].replace("_", " ") for r in result.requirements)
-        those = f"; {result.feasible.sum()} meet {names}"
+        those = f"; {result.accepted.sum()} meet {names}"
     return f"{result.problem.name}: atlas of {result.atlas.n_charts} charts, {result.status}{those}{unit}"
 
 
@@ -64,7 +64,7 @@ def film_title(path: GraspPath) -> str:
     """The problem, how long the path is, and whether it meets the requirements."""
     those = ""
     if path.result.requirements and path.knows_requirements:
-        met = int(path.feasible.sum())
+        met = int(path.accepted.sum())
         those = "; all of them meet the requirements" if met == len(path) else f"; {met} of them meet the requirements"
     return f"{path.result.problem.name}: path of length {path.length:.3g} through {len(path)} grasps{those}"
 

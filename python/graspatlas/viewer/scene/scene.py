@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspatlas.grasps.grasps import Grasp
-from graspatlas.result.result import Result
+from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.viewer.scene.bodies import BodyShapes
 from graspatlas.viewer.scene.camera import Camera
 from graspatlas.viewer.scene.meshes import Mesh, arrow, ellipsoid, merged
@@ -111,7 +111,7 @@ class Scene:
         GraspAtlasError: If a mesh of the hand or the object cannot be read.
     """
 
-    def __init__(self, result: Result, *, worst: bool = True) -> None:
+    def __init__(self, result: GraspAtlas, *, worst: bool = True) -> None:
         self.result = result
         shapes = BodyShapes(result.problem)
         best = result.refined_best if result.refinement else result.best

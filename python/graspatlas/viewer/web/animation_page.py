@@ -69,7 +69,7 @@ def _data(film: Film) -> str:
     if path.knows_quality:
         data["qualities"] = path.qualities[film.points].tolist()
     if path.result.requirements and path.knows_requirements:
-        data["feasible"] = path.feasible[film.points].tolist()
+        data["accepted"] = path.accepted[film.points].tolist()
     return json.dumps(data).replace("<", "\\u003c")
 
 

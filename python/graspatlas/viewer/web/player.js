@@ -14,7 +14,7 @@ function show(frame) {
   });
   slider.value = frame;
   const quality = film.qualities ? film.index + " " + film.qualities[frame].toPrecision(3) : "";
-  const breaks = Boolean(film.feasible) && !film.feasible[frame];
+  const breaks = Boolean(film.accepted) && !film.accepted[frame];
   const lengths = film.arc_lengths[frame].toFixed(3) + " of " + film.arc_lengths[frames - 1].toFixed(3);
   const numbers = "point " + film.points[frame] + " of " + film.points[frames - 1];
   readout.replaceChildren((quality || numbers) + (breaks ? " \u2717 breaks a requirement" : ""), document.createElement("br"));

@@ -1,0 +1,224 @@
+"""What was found, and nothing that is made of it: problem, atlas, values of the index, accepted grasps, the best."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from typing_extensions import Self
+
+from graspatlas import _core
+from graspatlas.atlas.atlas import Atlas
+from graspatlas.atlas.status import Status
+from graspatlas.errors import GraspAtlasError
+from graspatlas.grasps.grasps import Grasp, Grasps
+from graspatlas.problem.problem import Problem
+from graspatlas.quality.evaluation import Quality, evaluate, quality_name
+from graspatlas.requirements.screening import Require, screen
+from graspatlas.result.refinement import Refinement
+from graspatlas.support.arrays import Array, BoolArray
+from graspatlas.support.pickling import Light
+from graspatlas.support.renamed import renamed_attribute
+from graspatlas.support.validation import read_only
+
+__all__ = ["GraspAtlas"]
+
+
+@dataclass(frozen=True, eq=False)
+class GraspAtlas(Light):
+    """The best grasp, and everything it was chosen from; :class:`graspatlas.Result` adds what is made of it.
+
+    Its arrays cannot be written to: copy what you want to change.
+
+    Attributes:
+        problem: The problem.
+        atlas: Atlas of the relevant grasps.
+        quality: The index: its name, or the callable.
+        qualities: Its value at each chart centre [n].
+        quality_seconds: Time that its evaluation and that of the requirements took.
+        requirements: What a grasp must meet to be the best or the worst; a :class:`Lost` one where a file
+            did not keep a function.
+        accepted: Which charts meet the requirements [n].
+        rejected: How many charts each requirement rejected, of those that the ones before it had left.
+        others: Values of the other indices that were asked for, by name, [n] each.
+        refinement: Local maxima between the charts' centres, when they were asked for.
+    """
+
+    problem: Problem
+    atlas: Atlas
+    quality: Quality
+    qualities: Array
+    quality_seconds: float
+    requirements: tuple[Require, ...]
+    accepted: BoolArray
+    rejected: Mapping[str, int]
+    others: Mapping[str, Array] = field(default_factory=dict)
+    refinement: Refinement | None = None
+
+    def __repr__(self) -> str:
+        atlas = f"{self.atlas.n_charts} charts, k = {self.dimension}, {self.status}"
+        best = f"{self.qualities[self.accepted].max():.6g}" if self.accepted.any() else "none, no grasp will do"
+        return f"<{type(self).__name__} of {self.problem.name!r}: {atlas}; best {quality_name(self.quality)} {best}>"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "qualities", read_only(self.qualities))
+        object.__setattr__(self, "accepted", read_only(self.accepted))
+        object.__setattr__(self, "others", {name: read_only(values) for name, values in self.others.items()})
+
+    @property
+    def status(self) -> Status:
+        """Whether the atlas is complete, or why it was cut short."""
+        return self.atlas.status
+
+    @property
+    def dimension(self) -> int:
+        """k: dimension of the set of relevant grasps."""
+        return self.atlas.dimension
+
+    @property
+    def system(self) -> _core.GraspSystem:
+        """System R(x) = 0 of the relevant grasps.
+
+        Raises:
+            GraspAtlasError: If the atlas is not one of grasps.
+        """
+        system = self.atlas.system
+        if not isinstance(system, _core.GraspSystem):
+            raise GraspAtlasError(f"the atlas must be one of grasps, got one of a {type(system).__name__}")
+        return system
+
+    @property
+    def is_global(self) -> bool:
+        """True when the best is the best of all grasps connected to x1 that meet the requirements, up to a chart.
+
+        Then the atlas is complete and was audited, and the Jacobian keeps its rank: see :attr:`Atlas.doubts`, which say
+        why it is not. What an audit can know is said by :meth:`Audit.share_missing`.
+        """
+        return not self.atlas.doubts
+
+    @cached_property
+    def best(self) -> Grasp:
+        """Grasp with the largest quality of those that meet the requirements; the first of equals.
+
+        Raises:
+            GraspAtlasError: If no grasp meets them.
+        """
+        candidates = self.candidates()
+        return self.grasp(int(candidates[np.argmax(self.qualities[candidates])]))
+
+    @cached_property
+    def worst(self) -> Grasp:
+        """Grasp with the smallest quality of those that meet the requirements; the first of equals.
+
+        Raises:
+            GraspAtlasError: If no grasp meets them.
+        """
+        candidates = self.candidates()
+        return self.grasp(int(candidates[np.argmin(self.qualities[candidates])]))
+
+    def candidates(self) -> NDArray[np.intp]:
+        """Charts that meet the requirements, ascending; at least one.
+
+        Raises:
+            GraspAtlasError: If no grasp meets them.
+        """
+        if not self.accepted.any():
+            counts = ", ".join(f"{name} rejected {count}" for name, count in self.rejected.items())
+            raise GraspAtlasError(f"none of {self.atlas.n_charts} grasps meets the requirements ({counts}): relax one")
+        return np.flatnonzero(self.accepted)
+
+    @cached_property
+    def refined_best(self) -> Grasp:
+        """The best grasp, no longer bound to the centre of a chart; its chart is the one the climb to it began from.
+
+        It is the highest place at which a climb ended. Whether that is a maximum says ``refinement.statuses[0]``.
+
+        Raises:
+            GraspAtlasError: If no refinement was asked for.
+        """
+        if self.refinement is None:
+            raise GraspAtlasError("this result was not refined: give optimize refine=True")
+        system = self.problem.full_system if self.refinement.all_motions else self.system
+        one = Grasps(self.problem, self.refinement.x[0], system)[0]
+        quality, chart = float(self.refinement.qualities[0]), int(self.refinement.starts[0])
+        return replace(one, quality=quality, chart=chart)
+
+    @property
+    def gain(self) -> float:
+        """By how much the refined best is better than the best chart, as a share of the latter's quality."""
+        return (self.refined_best.quality - self.best.quality) / max(abs(self.best.quality), 1e-300)
+
+    def values(self, quality: Quality) -> Array:
+        """Value of any index at each chart centre [n].
+
+        Args:
+            quality: Name of an index, or a callable: see :mod:`graspatlas.quality`.
+
+        Raises:
+            GraspAtlasError: If there is no such index, or it fails.
+        """
+        name = quality_name(quality)
+        if quality == self.quality:
+            return self.qualities
+        if isinstance(quality, str) and name in self.others:
+            return self.others[name]
+        charts = np.arange(self.atlas.n_charts)
+        return evaluate(quality, Grasps(self.problem, self.atlas.centers, self.system, charts))
+
+    def by(self, quality: Quality) -> Self:
+        """The same grasps with another index to choose the best by; not refined.
+
+        Args:
+            quality: Name of an index, or a callable.
+
+        Raises:
+            GraspAtlasError: If there is no such index, or it fails.
+        """
+        values = self.values(quality)
+        kept = {**self.others, quality_name(self.quality): self.qualities}
+        kept.pop(quality_name(quality), None)
+        return replace(self, quality=quality, qualities=values, others=kept, refinement=None)
+
+    @property
+    def at_x1(self) -> Grasp:
+        """The first grasp; the atlas began with it."""
+        return self.grasp(0)
+
+    def grasp(self, chart: int) -> Grasp:
+        """Grasp at a chart's centre, with its quality.
+
+        Raises:
+            GraspAtlasError: If there is no such chart.
+        """
+        one = Grasps(self.problem, self.atlas.centers[self.checked_chart(chart)])[0]
+        return replace(one, quality=float(self.qualities[chart]), chart=chart)
+
+    def checked_chart(self, chart: int) -> int:
+        """The number of a chart that exists.
+
+        Raises:
+            GraspAtlasError: If there is no such chart.
+        """
+        whole = isinstance(chart, int | np.integer) and not isinstance(chart, bool)
+        if not whole or not 0 <= chart < self.atlas.n_charts:
+            raise GraspAtlasError(
+                f"chart {chart!r} does not exist; the atlas has charts 0 to {self.atlas.n_charts - 1}"
+            )
+        return int(chart)
+
+    def meets(self, X: ArrayLike) -> BoolArray:
+        """Which configurations meet the requirements [n].
+
+        Args:
+            X: Configurations [n, configuration_size].
+
+        Raises:
+            GraspAtlasError: If a requirement was a function, which files do not keep.
+        """
+        return screen(self.requirements, Grasps(self.problem, X))[0]
+
+    feasible = renamed_attribute("feasible", "accepted")
+    refused = renamed_attribute("refused", "rejected")
