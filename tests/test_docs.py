@@ -218,3 +218,8 @@ def test_what_counts_as_printed(said: str, good: bool) -> None:
     run.printed = "one\ntwo\n11 charts in 0.02 s\n"
     with contextlib.nullcontext() if good else pytest.raises(AssertionError, match="not printed"):
         run.run(Block("", "", "", said + "\n", 1))
+
+
+def test_the_manual_lists_every_page() -> None:
+    listed = {target for target, _ in LINK.findall(read("README.md"))}
+    assert {page.name for page in DOCS.glob("*.md")} - {"README.md"} <= listed

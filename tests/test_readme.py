@@ -39,3 +39,7 @@ def test_first_example(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: 
 def test_pictures_and_links_exist() -> None:
     for target in re.findall(r"\]\(([^)#]+)\)", README.read_text(encoding="utf-8")):
         assert target.startswith("http") or (README.parent / target).exists(), target
+
+
+def test_it_is_one_screen_and_a_half() -> None:
+    assert len(README.read_text(encoding="utf-8").splitlines()) <= 80, "what is longer belongs in docs/"
