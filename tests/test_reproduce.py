@@ -18,7 +18,8 @@ from PIL import Image
 from screens import BROWSER_FLAGS, find_browser
 
 import graspatlas as ga
-from graspatlas.analysis.climb import climb, local_maxima, peaks_of
+from graspatlas.analysis.climb import climb
+from graspatlas.analysis.peaks import local_maxima, peaks_of
 from graspatlas.reproduce import EXPERIMENT_NAMES, reproduce
 from graspatlas.reproduce.climbing import study
 from graspatlas.reproduce.experiments import EXPERIMENTS

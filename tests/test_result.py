@@ -236,7 +236,7 @@ ARRAYS = (
     "neighbour_pairs",
 )
 CHANGES = {
-    "future version": set_header(version=2),
+    "future version": set_header(version=3),
     "version of text": set_header(version="1"),
     "no problem": set_header(problem=None),
     "empty problem": set_header(problem={}),
@@ -270,7 +270,7 @@ def test_changed_files_are_refused(saved, tmp_path, name):
         load_bytes(rewritten(saved[1], CHANGES[name]), tmp_path)
     assert "\n" not in str(caught.value)
     if name == "future version":
-        assert "version 2" in str(caught.value)
+        assert "version 3" in str(caught.value)
 
 
 def test_missing_files(tmp_path):

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import graspatlas as ga
-from graspatlas.analysis.runaways import climbs_a_needle, followed, is_sharp, levels_around, never_levels_off
+from graspatlas.analysis.unbounded import followed, is_sharp, levels_around, never_levels_off, rises_towards_one_point
 from graspatlas.cli import main
 
 Array = NDArray[np.float64]
@@ -27,12 +27,12 @@ class Flat:
         self.f, self.x, self.value, self.reach = f, x, value, reach
         self.Phi = np.eye(len(x))
 
-    def look(self, W: Array) -> tuple[Array, Array]:
+    def evaluate(self, W: Array) -> tuple[Array, Array]:
         values = np.array([self.f(self.x + self.reach * w) for w in W])
         return (values - self.value) / abs(self.value), np.ones((len(W), 0))
 
     def better(self, W: Array) -> tuple[Array, float] | None:
-        gains = self.look(W)[0]
+        gains = self.evaluate(W)[0]
         best = int(gains.argmax())
         return (self.x + self.reach * W[best], self.f(self.x + self.reach * W[best])) if gains[best] > 1e-7 else None
 
@@ -84,7 +84,7 @@ def test_few_grasps_around_tell_nothing() -> None:
     levels = np.full(5, np.nan)
     assert not is_sharp(levels)
     assert not never_levels_off(levels)
-    assert not climbs_a_needle(levels)
+    assert not rises_towards_one_point(levels)
 
 
 # On grasps

@@ -16,7 +16,8 @@ from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 
 import graspatlas as ga
-from graspatlas.analysis.densify import Grid, _nearest_points, densify, jumps, lay_grid, most_samples
+from graspatlas.analysis.densify import _nearest_points, densify, jumps
+from graspatlas.atlas.grid import Grid, lay_grid, most_samples
 from graspatlas.cli import main
 
 Array = NDArray[np.float64]
@@ -266,7 +267,7 @@ def test_a_share_fills_the_charts_that_jump_most(small_result: ga.Result) -> Non
 
 
 def test_interrupted_work_is_kept(small_result: ga.Result, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("graspatlas.analysis.densify.BLOCK", 40)
+    monkeypatch.setattr("graspatlas.atlas.grid.BLOCK", 40)
     whole = densify(small_result, 0.05)
     calls = []
 

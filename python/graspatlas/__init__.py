@@ -6,9 +6,10 @@ import importlib
 import typing
 
 from graspatlas import libraries, patches, quality, systems  # noqa: F401  (libraries first: it loads the compiled core)
-from graspatlas.analysis.climb import Climb, Peak, climb, local_maxima, peaks_of
+from graspatlas.analysis.climb import Climb, climb
 from graspatlas.analysis.densify import Samples, densify
 from graspatlas.analysis.pareto import pareto_front
+from graspatlas.analysis.peaks import Peak, local_maxima, peaks_of
 from graspatlas.analysis.refine import refine
 from graspatlas.atlas.atlas import Atlas
 from graspatlas.atlas.build import build_atlas

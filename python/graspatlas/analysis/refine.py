@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from graspatlas.analysis.climb import MAX_STEPS, Climb, Peak, climb, local_maxima, peaks_of
+from graspatlas.analysis.climb import MAX_STEPS, Climb, climb
+from graspatlas.analysis.peaks import Peak, local_maxima, peaks_of
 from graspatlas.errors import GraspAtlasError
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.result.refinement import Refinement

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from graspatlas.analysis.climb import Climb, climb, peaks_of
+from graspatlas.analysis.climb import Climb, climb
+from graspatlas.analysis.peaks import peaks_of
 from graspatlas.reproduce.report import Number
 from graspatlas.result.result import Result
 from graspatlas.support.progress import counted

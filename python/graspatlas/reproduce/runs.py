@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from graspatlas.analysis.climb import local_maxima
+from graspatlas.analysis.peaks import local_maxima
 from graspatlas.atlas.status import Status
 from graspatlas.optimizer.optimize import optimize
 from graspatlas.problems import load_problem

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graspatlas.analysis.climb import local_maxima
+from graspatlas.analysis.peaks import local_maxima
 from graspatlas.grasps.grasps import Grasp, Grasps
 from graspatlas.quality.evaluation import INDICES, batched, evaluate
 from graspatlas.result.result import Result

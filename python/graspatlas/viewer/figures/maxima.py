@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.ticker import MaxNLocator
 
-from graspatlas.analysis.climb import Climb, Peak, climb, local_maxima, peaks_of
+from graspatlas.analysis.climb import Climb, climb
+from graspatlas.analysis.peaks import Peak, local_maxima, peaks_of
 from graspatlas.errors import GraspAtlasError
 from graspatlas.quality.evaluation import quality_name
 from graspatlas.result.result import Result

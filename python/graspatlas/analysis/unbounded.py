@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Place", "climbs_a_needle", "followed", "is_sharp", "levels_around", "never_levels_off"]
+__all__ = ["Model", "followed", "is_sharp", "levels_around", "never_levels_off", "rises_towards_one_point"]
 
 Array = NDArray[np.float64]
 
@@ -35,27 +35,27 @@ FINEST = 1e-7
 MOST_STEPS = 200
 
 
-class Place(Protocol):
-    """A grasp and the tangent space around it, in coordinates w [k] with |w| = 1 at the reach."""
+class Model(Protocol):
+    """A grasp and the tangent space around it, in coordinates w [k] with |w| = 1 at the trust radius."""
 
     Phi: Array
 
-    def look(self, W: Array) -> tuple[Array, Array]:
+    def evaluate(self, W: Array) -> tuple[Array, Array]:
         """Gains [n] over the grasp, as shares of its index, and slacks [n, c] of the points above W [n, k]."""
 
     def better(self, W: Array) -> tuple[Array, float] | None:
         """The best of the points above W that meet everything, and its index, if that is larger."""
 
 
-#: The surroundings of a grasp with this index, up to this reach.
-PlaceOf = Callable[[Array, float, float], Place]
+#: The surroundings of a grasp with this index, up to this trust radius.
+ModelOf = Callable[[Array, float, float], Model]
 
 
-def levels_around(place_of: PlaceOf, x: Array, value: float, radius: float) -> Array:
+def levels_around(model_of: ModelOf, x: Array, value: float, radius: float) -> Array:
     """Median of the index on each ring around a grasp, less the index there, as a share of it; NaN without grasps.
 
     Args:
-        place_of: The surroundings of a grasp.
+        model_of: The surroundings of a grasp.
         x: The grasp [configuration_size].
         value: The index there.
         radius: Chart radius, of which the rings are shares.
@@ -65,8 +65,8 @@ def levels_around(place_of: PlaceOf, x: Array, value: float, radius: float) -> A
     """
     levels = np.full(len(RINGS), np.nan)
     for i, share in enumerate(RINGS):
-        place = place_of(x, value, share * radius)
-        gains, slacks = place.look(_ring(RING_POINTS, len(place.Phi), seed=0))
+        model = model_of(x, value, share * radius)
+        gains, slacks = model.evaluate(_ring(RING_POINTS, len(model.Phi), seed=0))
         there = (gains > -1.0) & (slacks >= 0.0).all(axis=1)
         if there.sum() >= FEWEST:
             levels[i] = np.median(gains[there])
@@ -83,7 +83,7 @@ def never_levels_off(levels: Array) -> bool:
     return _lasts(levels[1:])
 
 
-def climbs_a_needle(levels: Array) -> bool:
+def rises_towards_one_point(levels: Array) -> bool:
     """True when the index gains on rings that are not smaller than a climb's last steps, while it still rises."""
     return _lasts(levels[:3])
 
@@ -93,25 +93,25 @@ def _lasts(levels: Array) -> bool:
     return bool(levels[0] < -RUN_AWAY and gains[0] > 0.0 and (gains[1:] >= LASTING * gains[:-1]).all())
 
 
-def followed(place_of: PlaceOf, x: Array, value: float, radius: float) -> tuple[Array, float]:
+def followed(model_of: ModelOf, x: Array, value: float, radius: float) -> tuple[Array, float]:
     """Where ever smaller steps lead from a sharp place, and the index there: the best of a ring, or a smaller ring.
 
     Args:
-        place_of: The surroundings of a grasp.
+        model_of: The surroundings of a grasp.
         x: Where to start [configuration_size].
         value: The index there.
         radius: Chart radius; the first ring has a hundredth of it.
     """
-    reach = RINGS[1] * radius
+    trust_radius = RINGS[1] * radius
     for step in range(MOST_STEPS):
-        place = place_of(x, value, reach)
-        found = place.better(_ring(8 * len(place.Phi), len(place.Phi), seed=step))
+        model = model_of(x, value, trust_radius)
+        found = model.better(_ring(8 * len(model.Phi), len(model.Phi), seed=step))
         if found is not None:
             x, value = found
-        elif reach <= FINEST * radius:
+        elif trust_radius <= FINEST * radius:
             break
         else:
-            reach *= 0.5
+            trust_radius *= 0.5
     return x, value
 
 
