@@ -16,6 +16,7 @@ from scipy.optimize import minimize
 
 import graspatlas as ga
 from graspatlas.requirements import screen
+from graspatlas.requirements.lost import Lost
 from graspatlas.systems import geodesic
 
 Array = NDArray[np.float64]
@@ -258,9 +259,9 @@ def test_a_path_of_one_point(small_result: ga.Result) -> None:
 
 
 def test_what_was_not_stored_is_named(small_result: ga.Result, tmp_path: Path) -> None:
-    lost = replace(small_result, quality="mine", requirements=("yours",))
+    lost = replace(small_result, quality="mine", requirements=(Lost("yours"),))
     path = ga.shortest_path(lost, 0, 5)
-    with pytest.raises(ga.GraspAtlasError, match="'yours' is a callable"):
+    with pytest.raises(ga.GraspAtlasError, match="'yours' is a function"):
         _ = path.accepted
     path.save_csv(tmp_path / "path.csv")
     assert "quality" not in (tmp_path / "path.csv").read_text(encoding="utf-8").splitlines()[0]
@@ -286,7 +287,10 @@ def test_ends_that_cannot_be(small_result: ga.Result, can_result: ga.Result) -> 
     ):
         with pytest.raises(ga.GraspAtlasError, match=words):
             ga.shortest_path(small_result, start)
-    for options, words in (({"step": 0.0}, "step must be positive"), ({"step": 9.0}, "at most the chart radius")):
+    for options, words in (
+        ({"step": 0.0}, "step must be a positive number"),
+        ({"step": 9.0}, "at most the chart radius"),
+    ):
         with pytest.raises(ga.GraspAtlasError, match=words):
             ga.shortest_path(small_result, **options)
     with pytest.raises(ga.GraspAtlasError, match=r"needs a graspatlas\.Result or an Atlas, got str"):

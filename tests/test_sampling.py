@@ -16,9 +16,10 @@ from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 
 import graspatlas as ga
-from graspatlas.analysis.densify import _nearest_points, densify, jumps
-from graspatlas.atlas.grid import Grid, lay_grid, most_samples
+from graspatlas.analysis.densify import densify, jumps
+from graspatlas.atlas.grid import Grid, _nearest_points, lay_grid, most_samples
 from graspatlas.cli import main
+from graspatlas.requirements.lost import Lost
 
 Array = NDArray[np.float64]
 
@@ -296,7 +297,7 @@ def test_misuse(small_result: ga.Result, sphere: ga.Atlas) -> None:
     for charts in ([-1], [sphere.n_charts], [0.5]):
         with pytest.raises(ga.GraspAtlasError, match="charts must be whole numbers"):
             lay_grid(sphere, 0.1, charts=charts)  # type: ignore[arg-type]
-    stored = replace(small_result, requirements=("mine",))
+    stored = replace(small_result, requirements=(Lost("mine"),))
     with pytest.raises(ga.GraspAtlasError, match="requirement 'mine' is a function"):
         densify(stored, 0.1)
     none = replace(small_result, requirements=(ga.ForceClosure(0.01),))

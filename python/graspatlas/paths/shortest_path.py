@@ -134,7 +134,10 @@ def shortest_path(
 def _step(atlas: Atlas, step: float | None) -> float:
     if step is None:
         return STEP * atlas.radius
-    return positive(step, "step", most=atlas.radius)
+    given = positive(step, "step")
+    if given > atlas.radius:
+        raise GraspAtlasError(f"step must be at most the chart radius, {atlas.radius:g}, got {given:g}")
+    return given
 
 
 def _tightened(atlas: Atlas, X: Array, step: float, allowed: Allowed | None, shown: bool) -> tuple[Array, bool]:
