@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TypeAlias
 
-__all__ = ["path_word"]
+__all__ = ["Subcommands", "path_word"]
+
+#: What the commands are added to.
+Subcommands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def path_word(word: str) -> Path:

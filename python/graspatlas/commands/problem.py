@@ -6,9 +6,8 @@ import argparse
 import json
 import os
 from pathlib import Path
-from typing import Any
 
-from graspatlas.commands.arguments import path_word
+from graspatlas.commands.arguments import Subcommands, path_word
 from graspatlas.commands.diagnosis import PROBLEM, Finding, diagnose, report
 from graspatlas.errors import GraspAtlasError
 from graspatlas.problems import load_problem
@@ -18,7 +17,7 @@ from graspatlas.support.terminal import say
 __all__ = ["add_problem_commands"]
 
 
-def add_problem_commands(commands: Any) -> None:
+def add_problem_commands(commands: Subcommands) -> None:
     """Add new, check and schema to the subcommands of a parser."""
     new = commands.add_parser("new", help="write a commented problem file for a hand, to be filled in")
     new.add_argument(

@@ -1,0 +1,147 @@
+"""The command graspatlas optimize: the main job, with its files and its report."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from graspatlas.analysis.climb import MAX_STEPS
+from graspatlas.atlas.checkpoints import CheckpointFolder
+from graspatlas.atlas.status import Status
+from graspatlas.commands.arguments import Subcommands, path_word
+from graspatlas.commands.exit_status import FAILED, INTERRUPTED
+from graspatlas.commands.report import component_lines, result_lines
+from graspatlas.optimizer.components import Components, SearchStatus, find_components
+from graspatlas.optimizer.optimize import optimize
+from graspatlas.problems import load_problem
+from graspatlas.quality.evaluation import INDICES
+from graspatlas.requirements.screening import parse_requirement
+from graspatlas.support.files import replaced, writable_folder
+from graspatlas.support.terminal import say
+
+__all__ = ["add_optimize_command"]
+
+
+def add_optimize_command(commands: Subcommands) -> None:
+    """Add optimize to the subcommands of a parser."""
+    best = commands.add_parser("optimize", help="trace all relevant grasps of a problem and find the best one")
+    best.add_argument("problem", help="name of a bundled problem, or path of a problem file (YAML)")
+    best.add_argument("--dimension", type=int, metavar="K", help="dimension k of the set of relevant grasps")
+    best.add_argument(
+        "--radius",
+        type=float,
+        metavar="R",
+        help="radius of a chart [rad, or lengths / length_scale]",
+    )
+    best.add_argument(
+        "--epsilon",
+        type=float,
+        metavar="E",
+        help="how different neighbouring charts may be, 0 to 1",
+    )
+    best.add_argument(
+        "--quality",
+        action="append",
+        metavar="NAME",
+        help=f"quality index; may be given several times, the first chooses the best: {', '.join(INDICES)}",
+    )
+    best.add_argument(
+        "--require",
+        action="append",
+        default=[],
+        metavar="NAME[:VALUE...]",
+        help="requirement that the best grasp must meet, such as collision_free, force_closure:0.5:0.02 (friction, "
+        "margin) or joint_margin:0.05; may be given several times; replaces those of the problem, 'none' drops them",
+    )
+    best.add_argument(
+        "--refine",
+        nargs="?",
+        const="relevant",
+        choices=("relevant", "feasible"),
+        default=False,
+        metavar="WHERE",
+        help="climb to the maximum between the charts' centres: among the relevant grasps, or with 'feasible' on among "
+        "all feasible ones, no hand motion frozen but couplings",
+    )
+    best.add_argument(
+        "--refine-steps",
+        type=int,
+        default=MAX_STEPS,
+        metavar="N",
+        help="give such a climb up after N steps, 200 by default",
+    )
+    _add_limits(best)
+    best.add_argument("--output", type=path_word, metavar="FOLDER", help="write result.npz and summary.json there")
+    best.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    best.set_defaults(run=_optimize)
+
+
+def _add_limits(best: argparse.ArgumentParser) -> None:
+    """What cuts the work short, or makes more of it."""
+    best.add_argument("--max-charts", type=int, metavar="N", help="cut the atlas short after N charts")
+    best.add_argument("--max-seconds", type=float, metavar="S", help="cut the atlas short after S seconds")
+    best.add_argument(
+        "--components",
+        action="store_true",
+        help="search for other connected components too, and take the best grasp over all of them; --max-seconds then "
+        "limits the whole search",
+    )
+    best.add_argument("--threads", type=int, metavar="N", help="threads to use, all cores by default; same result")
+
+
+def _optimize(options: argparse.Namespace) -> int:
+    problem = load_problem(options.problem)
+    require = [parse_requirement(text) for text in options.require if text != "none"] if options.require else None
+    folder = writable_folder(options.output) if options.output else None
+    names = (
+        "dimension",
+        "radius",
+        "epsilon",
+        "quality",
+        "refine",
+        "refine_steps",
+        "max_charts",
+        "max_seconds",
+        "threads",
+    )
+    given = {name: getattr(options, name) for name in names}
+    if options.components:
+        return _report_components(find_components(problem, **given, require=require, progress=True), options, folder)
+    checkpoint = folder / "checkpoint" if folder else None
+    result = optimize(problem, **given, require=require, checkpoint=checkpoint, progress=True)
+    if folder:
+        result.save(folder / "result.npz")
+        _write_json(result.summary(), folder / "summary.json")
+        if result.status in (Status.COMPLETE, Status.BLOCKED):
+            CheckpointFolder.remove(folder / "checkpoint")
+    say(json.dumps(result.summary()) if options.json else "\n".join(result_lines(result, folder)))
+    if result.status is Status.INTERRUPTED:
+        return INTERRUPTED
+    return 0 if result.accepted.any() else FAILED
+
+
+def _report_components(found: Components, options: argparse.Namespace, folder: Path | None) -> int:
+    """Write and print the components; the exit status."""
+    best = found.best_result
+    if folder:
+        best.save(folder / "result.npz")
+        _write_json(best.summary(), folder / "summary.json")
+        _write_json(found.summary(), folder / "components.json")
+        others = writable_folder(folder / "components")
+        for number, result in enumerate(found.results[1:], start=2):
+            result.save(others / f"{number}.npz")
+    if options.json:
+        say(json.dumps(found.summary()))
+    else:
+        say(*component_lines(found))
+        say(*result_lines(best, folder))
+    if found.status is SearchStatus.INTERRUPTED:
+        return INTERRUPTED
+    return 0 if best.accepted.any() else FAILED
+
+
+def _write_json(table: dict[str, Any], path: Path) -> None:
+    with replaced(path) as stream:
+        stream.write((json.dumps(table, indent=2) + "\n").encode("utf-8"))
