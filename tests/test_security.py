@@ -103,13 +103,13 @@ def test_the_workers_of_a_sweep_run_nothing_of_the_current_folder(
     if knows_safe_path and sys.version_info < (3, 11):
         pytest.skip("this version of Python knows no safe path")
     script = Path(command[1])
-    known = f"import graspatlas.sweep.sweep\ngraspatlas.sweep.sweep.KNOWS_SAFE_PATH = {knows_safe_path}\n"
+    known = f"import graspatlas.sweep.workers\ngraspatlas.sweep.workers.KNOWS_SAFE_PATH = {knows_safe_path}\n"
     text = script.read_text().replace("if __name__", f"{known}if __name__")
     if not knows_safe_path:
         text = text.replace(
-            "graspatlas.sweep.sweep.KNOWS",
-            "graspatlas.sweep.sweep._safe_path = lambda: __import__('contextlib').nullcontext()\n"
-            "graspatlas.sweep.sweep.KNOWS",
+            "graspatlas.sweep.workers.KNOWS",
+            "graspatlas.sweep.workers._safe_path = lambda: __import__('contextlib').nullcontext()\n"
+            "graspatlas.sweep.workers.KNOWS",
         )
     script.write_text(text)
     words = ["sweep", "planar_hand", "--radius", "0.4", "--workers", "1", "--output", str(tmp_path / "out"), "--json"]
