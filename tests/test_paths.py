@@ -139,7 +139,7 @@ def test_a_chain_hugs_what_is_not_allowed() -> None:
         asked.append(len(X))
         return np.asarray(X[:, 0] <= HEIGHT)
 
-    tight, done = geodesic.shorten(system, chain, reach=0.1, longest=0.015, allowed=allowed)
+    tight, done = geodesic.shorten(system, chain, trust_radius=0.1, longest=0.015, allowed=allowed)
     assert done
     assert allowed(tight).all()
     length = geodesic.arc_lengths(system, tight)[-1]
@@ -155,7 +155,7 @@ def test_interrupted_shortening_leaves_a_path(sphere: ga.Atlas, monkeypatch: pyt
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(geodesic, "_pulled", interrupt)
+    monkeypatch.setattr(geodesic, "_shortened", interrupt)
     path = ga.shortest_path(sphere, 0, 300)
     assert not path.tight
     assert path.length > np.arccos(sphere.centers[0] @ sphere.centers[300])
@@ -195,7 +195,7 @@ def test_pulling_shortens_the_graph_path_and_ends(can_result: ga.Result) -> None
     assert_sound(path, 0.1 * can_result.atlas.radius)
     centres = can_result.atlas.centers[list(dict.fromkeys(path.charts.tolist()))]
     assert path.length < geodesic.arc_lengths(can_result.atlas.system, centres)[-1]
-    again, _ = geodesic.shorten(can_result.atlas.system, path.x, reach=0.17, longest=0.03)
+    again, _ = geodesic.shorten(can_result.atlas.system, path.x, trust_radius=0.17, longest=0.03)
     assert geodesic.arc_lengths(can_result.atlas.system, again)[-1] > 0.999 * path.length
 
 

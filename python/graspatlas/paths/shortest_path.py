@@ -124,8 +124,8 @@ def shortest_path(
         X, tight = ends[0].x[None], True
     else:
         shown = sys.stderr.isatty() if progress is None else progress
-        X = _Roads(atlas, open_charts, ends, longest / SPARE, allowed).travel()
-        X, tight = _tightened(atlas, X, longest, allowed, shown)
+        X = _ChartGraph(atlas, open_charts, ends, longest / SPARE, allowed).shortest_chain()
+        X, tight = _shortened(atlas, X, longest, allowed, shown)
     residuals = np.array([np.abs(atlas.system.evaluate_residual(x)).max(initial=0.0) for x in X])
     arguments = (atlas, X, arc_lengths(atlas.system, X), residuals, tight)
     return GraspPath(*arguments, result) if result else Path(*arguments)
@@ -140,15 +140,15 @@ def _step(atlas: Atlas, step: float | None) -> float:
     return given
 
 
-def _tightened(atlas: Atlas, X: Array, step: float, allowed: Allowed | None, shown: bool) -> tuple[Array, bool]:
-    """The chain X pulled tight, with even steps if all its points are then allowed, and whether it is tight."""
+def _shortened(atlas: Atlas, X: Array, step: float, allowed: Allowed | None, shown: bool) -> tuple[Array, bool]:
+    """The chain X shortened, with even steps if all its points are then allowed, and whether no step shortens it."""
 
     def even(chain: Array, length: float) -> Array:
         spread = evenly(atlas.system, chain, length)
         return spread if spread is not None and (allowed is None or allowed(spread).all()) else chain
 
     X = even(X, step / SPARE)
-    X, tight = shorten(atlas.system, X, reach=atlas.radius, longest=step, allowed=allowed, progress=shown)
+    X, tight = shorten(atlas.system, X, trust_radius=atlas.radius, longest=step, allowed=allowed, progress=shown)
     return even(X, step), tight
 
 
@@ -210,7 +210,7 @@ def _check_on_manifold(atlas: Atlas, result: GraspAtlas | None, name: str, x: Ar
         raise GraspAtlasError(f"{name} is {-slack:.1e} outside its bounds [units of the tangent space]")
 
 
-class _Roads:
+class _ChartGraph:
     """Charts that may be passed as a graph, with the two ends of the path.
 
     Nodes are charts by their numbers, and ends that are no chart's centre after them.
@@ -230,14 +230,14 @@ class _Roads:
                 pairs.append(np.column_stack([beside, np.full(len(beside), len(self.points))]))
                 self.points.append(end.x)
         self.open = np.append(open_charts, np.ones(len(self.points) - atlas.n_charts, bool))
-        roads = np.concatenate(pairs)
-        self.pairs = roads[self.open[roads].all(axis=1)]
+        edges = np.concatenate(pairs)
+        self.pairs = edges[self.open[edges].all(axis=1)]
         difference = atlas.system.difference
         self.lengths = np.array([np.linalg.norm(difference(self.points[i], self.points[j])) for i, j in self.pairs])
         self.chains: dict[tuple[int, int], Array] = {}
         self.n_closed = 0
 
-    def travel(self) -> Array:
+    def shortest_chain(self) -> Array:
         """The shortest chain of points from end to end [n, configuration_size].
 
         Neighbours between which no chain leads, or none that is allowed, are parted, and the way is sought again.
@@ -245,7 +245,7 @@ class _Roads:
         while True:
             route = self._route()
             legs = [(min(pair), max(pair)) for pair in pairwise(route)]
-            closed = self._explore([leg for leg in legs if leg not in self.chains])
+            closed = self._connect([leg for leg in legs if leg not in self.chains])
             if not closed:
                 break
             self.n_closed += len(closed)
@@ -254,8 +254,8 @@ class _Roads:
         pieces = [self.chains[a, b] if a < b else self.chains[b, a][::-1] for a, b in pairwise(route)]
         return np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
 
-    def _explore(self, legs: list[tuple[int, int]]) -> set[tuple[int, int]]:
-        """Bridge legs; those that cannot be are returned."""
+    def _connect(self, legs: list[tuple[int, int]]) -> set[tuple[int, int]]:
+        """Find the chains of legs; legs that have none are returned."""
         found = {(a, b): bridge(self.atlas.system, self.points[a], self.points[b], self.step) for a, b in legs}
         closed = {leg for leg, chain in found.items() if chain is None}
         chains = {leg: chain for leg, chain in found.items() if chain is not None}

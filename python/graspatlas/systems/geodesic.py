@@ -1,4 +1,4 @@
-r"""Curves on a manifold, pulled tight: from any chain of points to a shortest one between its ends.
+r"""Curves on a manifold, as short as they can be: from any chain of points to a shortest one between its ends.
 
 A chain :math:`x_0, \dots, x_n` on the manifold has the energy
 
@@ -25,7 +25,7 @@ from graspatlas import _core
 from graspatlas.support.progress import progress_bar
 from graspatlas.systems.system import AnySystem
 
-__all__ = ["BOUND_TOLERANCE", "Allowed", "arc_lengths", "bridge", "evenly", "settle", "shorten"]
+__all__ = ["BOUND_TOLERANCE", "Allowed", "arc_lengths", "bridge", "evenly", "nearest_point", "shorten"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -51,14 +51,14 @@ MAX_STEPS = 60
 LEAST_GAIN = 2e-6
 #: Gain that ends them where a black box limits the chain: what follows is slow and small.
 LEAST_GAIN_LIMITED = 1e-5
-#: Shares of a move that are tried, and rounds in which walls are found on the way.
+#: Shares of a move that are tried, and rounds in which half-spaces are learned.
 FRACTIONS = (1.0, 0.5, 0.25, 0.1)
 ROUNDS = 3
-#: Halvings of a move that find where it passes a wall, and how far from there, as a share of a step, it is asked which
-#: way the wall runs.
-WALL_HALVINGS = 6
+#: Halvings of a move that find where it leaves what is allowed, and how far from there, as a share of a step, it is
+#: asked on which side that lies.
+BORDER_HALVINGS = 6
 PROBE = 0.25
-#: What is asked round a place says nothing of a wall when the sum of the directions is shorter than this.
+#: What is asked round a place says nothing of a border when the sum of the directions is shorter than this.
 NO_SIDE = 1e-9
 #: Steps of the interior-point method, share of the complementarity that each aims at, and what may be left of it.
 MAX_INTERIOR_STEPS = 60
@@ -81,7 +81,7 @@ def tangent_bases(system: AnySystem, X: Array) -> Array:
     return np.ascontiguousarray(Q[:, :, system.n_equations :].transpose(0, 2, 1))
 
 
-def settle(system: AnySystem, x: Array) -> Array | None:
+def nearest_point(system: AnySystem, x: Array) -> Array | None:
     """The point of the manifold near x, inside its bounds: least-norm Newton steps, broken bounds held as equations.
 
     Returns:
@@ -104,7 +104,7 @@ def _above(system: AnySystem, x: Array, Phi: Array, u: Array) -> Array | None:
     y = _core.project(system, x, Phi, u)
     if y is None:
         return None
-    return np.asarray(y) if system.slack(y).min(initial=0.0) >= 0.0 else settle(system, np.asarray(y))
+    return np.asarray(y) if system.slack(y).min(initial=0.0) >= 0.0 else nearest_point(system, np.asarray(y))
 
 
 def bridge(system: AnySystem, a: Array, b: Array, step: float) -> Array | None:
@@ -166,63 +166,69 @@ def evenly(system: AnySystem, X: Array, step: float) -> Array | None:
 
 
 def shorten(
-    system: AnySystem, X: Array, *, reach: float, longest: float, allowed: Allowed | None = None, progress: bool = False
+    system: AnySystem,
+    X: Array,
+    *,
+    trust_radius: float,
+    longest: float,
+    allowed: Allowed | None = None,
+    progress: bool = False,
 ) -> tuple[Array, bool]:
-    """Pull a chain tight between its ends.
+    """Shorten a chain between its ends until it is as short as its neighbours allow.
 
     Ctrl-C ends the work and returns the chain as it is: it is on the manifold and allowed at any time.
 
     Args:
         system: The system.
         X: The chain [n, configuration_size], on the manifold and inside its bounds.
-        reach: How far a point may move at once [units of the tangent space].
+        trust_radius: How far a point may move at once [units of the tangent space].
         longest: Longest step that the chain may have.
         allowed: Tells which points may be part of the chain; that holds for all of X.
         progress: Show a progress bar on standard error.
 
     Returns:
-        The chain [n, configuration_size] and whether it is as short as it can be pulled.
+        The chain [n, configuration_size] and whether it is as short as it can be made.
     """
     if len(X) < 3:
         return X, True
-    band = _Band(system, X)
+    chain = _Chain(system, X)
     least = LEAST_GAIN if allowed is None else LEAST_GAIN_LIMITED
     try:
         with progress_bar("path", "steps", MAX_STEPS, progress) as bar:
             for _ in range(MAX_STEPS):
-                shorter = _pulled(band, reach, longest, allowed)
+                shorter = _shortened(chain, trust_radius, longest, allowed)
                 if shorter is None:
-                    return band.X, True
-                gain = 1.0 - shorter.energy / band.energy
-                band = shorter
+                    return chain.X, True
+                gain = 1.0 - shorter.energy / chain.energy
+                chain = shorter
                 bar.update()
                 if gain < least:
-                    return band.X, True
+                    return chain.X, True
     except KeyboardInterrupt:
         pass
-    return band.X, False
+    return chain.X, False
 
 
-def _pulled(band: _Band, reach: float, longest: float, allowed: Allowed | None) -> _Band | None:
+def _shortened(chain: _Chain, trust_radius: float, longest: float, allowed: Allowed | None) -> _Chain | None:
     """The chain after one step, or None when no step makes it shorter."""
-    walls = _Walls.nowhere(band)
-    u = _capped(band.plan(walls, reach), reach)
+    learned = _HalfSpaces.none(chain)
+    u = _capped(chain.plan(learned, trust_radius), trust_radius)
     for fraction in FRACTIONS:
         move = fraction * u
-        moved = band.moved(move) if allowed is None else _allowed_move(band, move, fraction, reach, allowed)
+        moved = chain.moved(move) if allowed is None else _allowed_move(chain, move, fraction, trust_radius, allowed)
         if moved is None:
             continue
-        shorter = _Band(band.system, moved)
-        if shorter.energy < band.energy and shorter.longest <= max(longest, band.longest):
+        shorter = _Chain(chain.system, moved)
+        if shorter.energy < chain.energy and shorter.longest <= max(longest, chain.longest):
             return shorter
     return None
 
 
-def _allowed_move(band: _Band, u: Array, fraction: float, reach: float, allowed: Allowed) -> Array | None:
-    """The chain moved by u [n, k], all its points allowed: by a fraction of another move where walls are in the way."""
-    walls = _Walls.nowhere(band)
+def _allowed_move(chain: _Chain, u: Array, fraction: float, trust_radius: float, allowed: Allowed) -> Array | None:
+    """The chain moved by u [n, k], all its points allowed: by a fraction of another move where some are not."""
+    learned = _HalfSpaces.none(chain)
     for attempt in range(ROUNDS + 1):
-        moved = band.moved(u)
+        moved = chain.moved(u)
         if moved is None:
             return None
         going = np.flatnonzero(np.any(u != 0.0, axis=1))
@@ -230,20 +236,20 @@ def _allowed_move(band: _Band, u: Array, fraction: float, reach: float, allowed:
         if len(bad) == 0:
             return moved
         if attempt == ROUNDS:
-            moved[bad] = band.X[bad]
+            moved[bad] = chain.X[bad]
             return moved
-        walls.find(band, bad, u, allowed)
-        u = fraction * _capped(band.plan(walls, reach), reach)
+        learned.add(chain, bad, u, allowed)
+        u = fraction * _capped(chain.plan(learned, trust_radius), trust_radius)
     return None
 
 
-def _capped(u: Array, reach: float) -> Array:
+def _capped(u: Array, trust_radius: float) -> Array:
     """Moves u [n, k] shortened so that none is longer than this."""
-    return np.asarray(u * min(1.0, reach / max(float(np.linalg.norm(u, axis=1).max()), 1e-300)))
+    return np.asarray(u * min(1.0, trust_radius / max(float(np.linalg.norm(u, axis=1).max()), 1e-300)))
 
 
-class _Band:
-    """A chain X [n, configuration_size] with its energy, and the quadratic model of that in the tangent spaces."""
+class _Chain:
+    """A chain X (n, configuration_size) with its energy, and the quadratic model of that in the tangent spaces."""
 
     def __init__(self, system: AnySystem, X: Array) -> None:
         self.system, self.X = system, X
@@ -279,17 +285,17 @@ class _Band:
         after = self.system.difference(x, self.X[i + 1])
         return 0.5 * float(before @ before + after @ after)
 
-    def plan(self, walls: _Walls, reach: float) -> Array:
+    def plan(self, learned: _HalfSpaces, trust_radius: float) -> Array:
         """Moves u [n, k] that lower the model's energy most inside the bounds, by a primal-dual interior-point method.
 
         Args:
-            walls: Half-spaces beside the bounds.
-            reach: Half-spaces farther away than this play no part.
+            learned: Half-spaces beside the bounds.
+            trust_radius: Half-spaces farther away than this play no part.
         """
         Phi, gradient, C, S = self.model
-        C = np.concatenate([C, walls.normals[:, None]], axis=1)
-        S = np.column_stack([S, walls.offsets])
-        near = reach * np.linalg.norm(C, axis=2) >= S
+        C = np.concatenate([C, learned.normals[:, None]], axis=1)
+        S = np.column_stack([S, learned.offsets])
+        near = trust_radius * np.linalg.norm(C, axis=2) >= S
         near[[0, -1]] = False
         rows = near.any(axis=0)
         if not rows.any():
@@ -298,7 +304,7 @@ class _Band:
         C, S = np.where(near[..., None], C[:, rows], 0.0), np.where(near, S[:, rows], 1.0)
         u = np.zeros_like(gradient)
         first = mu = float(np.abs(gradient).max()) * self.longest
-        s = np.maximum(S, 1e-3 * reach)  # distances from the bounds
+        s = np.maximum(S, 1e-3 * trust_radius)  # distances from the bounds
         z = np.where(near, mu / s, 0.0)  # forces of the bounds
         for _ in range(MAX_INTERIOR_STEPS):
             off = np.einsum("nbk,nk->nb", C, u) + s - S
@@ -311,26 +317,26 @@ class _Band:
             share = min(1.0, 0.99 / max(float(ratios.max()), 1e-300))
             u, s, z = u + share * du, s + share * ds, z + share * dz
             mu = float((s * z)[near].mean())
-            if mu < INTERIOR_TOLERANCE * first and np.abs(off[near]).max() < INTERIOR_TOLERANCE * reach:
+            if mu < INTERIOR_TOLERANCE * first and np.abs(off[near]).max() < INTERIOR_TOLERANCE * trust_radius:
                 break
         return u
 
     @staticmethod
     def _stiffness(Phi: Array, u: Array) -> Array:
-        """Hessian of the model times u: each point is tied to the two beside it [n, k]."""
+        """Hessian of the model times u: each point is coupled to the two beside it [n, k]."""
         v = np.einsum("nkv,nk->nv", Phi, u)
         beside = np.zeros_like(v)
         beside[1:] += v[:-1]
         beside[:-1] += v[1:]
         return np.asarray(2.0 * u - np.einsum("nkv,nv->nk", Phi, beside))
 
-    def _solve(self, force: Array, walls: float | Array = 0.0) -> Array:
-        """Moves du [n, k] with (Hessian + walls) du = -force, and none of the ends; walls [n, k, k]."""
+    def _solve(self, force: Array, barrier: float | Array = 0.0) -> Array:
+        """Moves du [n, k] with (Hessian + barrier) du = -force, and none of the ends; barrier (n, k, k)."""
         n, k = force.shape
         free = np.ones((n, 1, 1))
         free[[0, -1]] = 0.0
-        diagonal = (1.0 + free) * np.eye(k) + free * walls
-        below = free[1:] * self._ties * free[:-1]
+        diagonal = (1.0 + free) * np.eye(k) + free * barrier
+        below = free[1:] * self._couplings * free[:-1]
         bands = np.zeros((2 * k, n, k))
         for row in range(k):
             for column in range(k):
@@ -341,7 +347,7 @@ class _Band:
         return np.asarray(du.reshape(n, k))
 
     @cached_property
-    def _ties(self) -> Array:
+    def _couplings(self) -> Array:
         """Blocks of the Hessian between neighbouring points [n - 1, k, k]."""
         Phi = self.model[0]
         return np.asarray(-Phi[1:] @ Phi[:-1].transpose(0, 2, 1))
@@ -363,32 +369,32 @@ class _Band:
 
 
 @dataclass(frozen=True, eq=False)
-class _Walls:
-    """What a black box forbids, as one half-space of each tangent space: normals [n, k], offsets [n].
+class _HalfSpaces:
+    """What a black box forbids, as one half-space of each tangent space: normals (n, k), offsets (n,).
 
-    A wall is found by halving the move that leads through it, and by asking round the place where that passes it.
+    One is learned by halving the move that leads out of what is allowed, and by asking round the place where it does.
     """
 
     normals: Array
     offsets: Array
 
     @classmethod
-    def nowhere(cls, band: _Band) -> _Walls:
-        """No walls."""
-        n, k = len(band.X), band.system.dimension
+    def none(cls, chain: _Chain) -> _HalfSpaces:
+        """None yet."""
+        n, k = len(chain.X), chain.system.dimension
         return cls(np.zeros((n, k)), np.full(n, np.inf))
 
-    def find(self, band: _Band, points: NDArray[np.intp], u: Array, allowed: Allowed) -> None:
-        """Add the walls between points and the places to which they would move, u [n, k]."""
+    def add(self, chain: _Chain, points: NDArray[np.intp], u: Array, allowed: Allowed) -> None:
+        """Add those between points and the places to which they would move, u (n, k)."""
         share, width = np.zeros(len(points)), 1.0
-        for _ in range(WALL_HALVINGS):
+        for _ in range(BORDER_HALVINGS):
             width /= 2.0
-            tried = np.array([band.above(i, (f + width) * u[i]) for i, f in zip(points, share, strict=True)])
+            tried = np.array([chain.above(i, (f + width) * u[i]) for i, f in zip(points, share, strict=True)])
             share += np.where(allowed(tried), width, 0.0)
         ring = _directions(u.shape[1])
         places = share[:, None] * u[points]
-        reach = PROBE * band.longest
-        asked = [band.above(i, place + reach * e) for i, place in zip(points, places, strict=True) for e in ring]
+        probe = PROBE * chain.longest
+        asked = [chain.above(i, place + probe * e) for i, place in zip(points, places, strict=True) for e in ring]
         side = np.where(allowed(np.array(asked)), -1.0, 1.0).reshape(len(points), len(ring)) @ ring
         size = np.linalg.norm(side, axis=1, keepdims=True)
         ahead = u[points] / np.linalg.norm(u[points], axis=1, keepdims=True)
