@@ -14,7 +14,7 @@ def main() -> None:
     """Trace the grasps that four motors and a coupling allow, and verify that the mimics hold."""
     problem = ga.load_problem("three_finger_cup")
     mechanism = problem.hand.mechanism
-    print(f"{len(problem.hand.joints)} joints, driven are {', '.join(mechanism.driven)}; the others mimic:")
+    print(f"{len(problem.hand.joints)} joints, actuated are {', '.join(mechanism.actuated)}; the others mimic:")
     for mimic in mechanism.mimics:
         print(f"  {mimic}")
     print(
@@ -32,10 +32,10 @@ def main() -> None:
 
     # A posture may leave out what mimics: the hand knows it.
     best = result.refined_best
-    driven = {name: best.joint_positions[name] for name in mechanism.driven}
-    posture = mechanism.completed(driven, "the motors' posture")
+    motors = {name: best.joint_positions[name] for name in mechanism.actuated}
+    posture = mechanism.completed(motors, "the motors' posture")
     assert all(np.isclose(posture[name], angle) for name, angle in best.joint_positions.items())
-    print("motors [rad]:", {name: round(angle, 3) for name, angle in driven.items()})
+    print("motors [rad]:", {name: round(angle, 3) for name, angle in motors.items()})
 
     folder = Path("out/mimic_hand")
     folder.mkdir(parents=True, exist_ok=True)

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 import graspatlas as ga
-from graspatlas.hand.urdf import cylinder_urdf
 
 URDF = Path(__file__).parent / "own_hand" / "three_fingers.urdf"
 FINGERS = ("thumb", "left", "right")
@@ -52,7 +51,7 @@ def jar_problem(hand: ga.Hand, couplings: list[dict[str, float]]) -> ga.Problem:
     return ga.Problem(
         name="jar",
         hand=hand,
-        object=ga.Body("jar", cylinder_urdf("jar", JAR_RADIUS, JAR_HEIGHT)),
+        object=ga.Body.cylinder("jar", JAR_RADIUS, JAR_HEIGHT),
         contacts=tuple(ga.Contact(f"{finger}_distal", pad, wall, frozen.get(finger, {})) for finger in FINGERS),
         motions=ga.HandMotions.from_couplings(couplings, hand.joints),
         pose_guess=GUESS,

@@ -142,7 +142,7 @@ def arrays_in(thing: Any, path: str, seen: dict[int, Any], depth: int = 5) -> li
         if not name.startswith("__") and name not in ("object_pose", "palm_pose"):
             try:
                 value = getattr(thing, name)
-            except ga.GraspAtlasError:
+            except (ga.GraspAtlasError, DeprecationWarning):  # an earlier name, which warns
                 continue
             if not callable(value):
                 out += arrays_in(value, f"{path}.{name}", seen, depth - 1)

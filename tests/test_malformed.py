@@ -81,8 +81,8 @@ def put(data: Any, path: tuple[str | int, ...], value: object) -> Any:
         ("length_scale: !!float abc", r"p.yaml:1: the tag \S+float does not fit 'abc'"),
         ("hand: !!bool perhaps", r"p.yaml:1: the tag \S+bool does not fit 'perhaps'"),
         ("hand: !!timestamp 2001-01-01", r"p.yaml:1: the tag \S+timestamp is not allowed"),
-        ('name: "\\ud800"', r"p.yaml:1: \S+ holds an escape that is no letter"),
-        ('"\\ud800": 1', r"p.yaml:1: \S+ holds an escape that is no letter"),
+        ('name: "\\ud800"', r"p.yaml:1: \S+ holds an escape that is not a character"),
+        ('"\\ud800": 1', r"p.yaml:1: \S+ holds an escape that is not a character"),
     ],
     ids=["brackets", "tables", "digits", "int", "float", "bool", "timestamp", "surrogate", "key"],
 )
@@ -243,7 +243,7 @@ def test_meshes_that_are_none(kind: str, tmp_path: Path) -> None:
     hole = T.copy()
     hole[3, 1, 2] = np.nan
     cases = {
-        "no places, as": [hole, T * np.inf, T * 1e30],
+        "not finite numbers, such as": [hole, T * np.inf, T * 1e30],
         "has no area": [T * [1.0, 0.0, 0.0], T * 0.0 + 1.0, T[:0]],
     }
     path = tmp_path / ("m.obj" if kind == "obj" else "m.stl")

@@ -43,7 +43,7 @@ def test_the_atlas_is_complete_and_the_best_grasp_holds(name, request):
 
 def test_the_jaws_move_as_one(gripper):
     assert gripper.problem.full_dimension == 2
-    assert gripper.problem.hand.mechanism.driven == ("left_slide",)
+    assert gripper.problem.hand.mechanism.actuated == ("left_slide",)
     q = gripper.atlas.centers[:, :2]
     assert np.abs(q[:, 0] - q[:, 1]).max() < 1e-9
     assert np.ptp(q[:, 0]) > 3e-4
@@ -57,7 +57,7 @@ def test_the_jaws_move_as_one(gripper):
 def test_the_fingers_bend_and_spread_by_their_mimics(hand):
     problem = hand.problem
     assert problem.full_dimension == 3
-    assert problem.hand.mechanism.driven == ("left_spread", "left_proximal", "right_proximal", "thumb_proximal")
+    assert problem.hand.mechanism.actuated == ("left_spread", "left_proximal", "right_proximal", "thumb_proximal")
     X = np.vstack([hand.atlas.centers, hand.refinement.x])
     q = {name: X[:, i] for i, name in enumerate(problem.hand.joints)}
     assert np.abs(q["right_spread"] + q["left_spread"]).max() < 1e-9

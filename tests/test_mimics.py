@@ -59,10 +59,10 @@ def broken(problem: ga.Problem, X: np.ndarray) -> float:
 def test_tags_are_read_and_chains_resolved():
     hand = finger(("f1", "f0", {}), ("f3", "f2", {"multiplier": 2, "offset": 0.5}), ("f2", "f1", {"multiplier": -0.5}))
     assert hand.joints == ("f0", "f1", "f2", "f3")
-    assert hand.mechanism.driven == ("f0",)
+    assert hand.mechanism.actuated == ("f0",)
     assert hand.mechanism.followers["f3"] == Mimic("f3", "f0", -1.0, 0.5)
     assert hand.mechanism.completed({"f0": 1.0}, "p") == {"f0": 1.0, "f1": 1.0, "f2": -0.5, "f3": -0.5}
-    np.testing.assert_allclose(hand.mechanism.A[:, 0], [1.0, 1.0, -0.5, -1.0])
+    np.testing.assert_allclose(hand.mechanism.transmission[:, 0], [1.0, 1.0, -0.5, -1.0])
 
 
 def test_random_charts_of_an_atlas_keep_the_mimics(coupled, coupled_result):
@@ -80,7 +80,7 @@ def test_mimics_add_no_freedom_and_are_none_of_the_frozen_motions(can, coupled):
     assert coupled.system(2).tangent_size == can.system(2).tangent_size
     everything = ga.Grasps(can, coupled.x1_array).J[0]
     own = ga.Grasps(coupled, coupled.x1_array).J[0]
-    steps = coupled.hand.mechanism.A
+    steps = coupled.hand.mechanism.transmission
     np.testing.assert_allclose(own, everything @ steps, atol=1e-15)
     assert own.shape == (9, 11)
 
@@ -139,7 +139,7 @@ def test_x1_is_completed_corrected_or_refused(coupled):
 
 
 def test_hand_motions_may_leave_the_mimics_out(coupled):
-    motions, driven = coupled.motions, coupled.hand.mechanism.driven
+    motions, driven = coupled.motions, coupled.hand.mechanism.actuated
     few = replace(coupled, motions=motions.reordered(coupled.hand.joints).reordered(driven))
     assert set(few.motions.joints) == set(coupled.hand.joints)
     atlas = ga.build_atlas(few.system(2), few.x1_array, radius=0.4, epsilon=0.5, max_charts=50)
@@ -170,7 +170,7 @@ def test_locking_takes_the_mimics_along():
     assert hand.with_joints(None, {"f1": 0.5}).joints == ("f0", "f3")
     assert hand.with_joints(["f0", "f1"]).joints == ("f0", "f1", "f2")
     still, free = hand.with_joints(["f0"], {"f1": 0.5, "f2": 0.5}), hand.with_joints(None, {"f0": 0.2})
-    assert (still.joints, free.mechanism.driven) == (("f0",), ("f1", "f3"))
+    assert (still.joints, free.mechanism.actuated) == (("f0",), ("f1", "f3"))
     places = hand.link_placements(np.array([0.3, 0.5, 0.5, 0.0]))
     np.testing.assert_allclose(still.link_placements(np.array([0.3]))["f_tip"], places["f_tip"], atol=1e-12)
     with pytest.raises(ga.GraspAtlasError, match="'f2' mimics 'f1' and stands still only with it: lock 'f1'"):

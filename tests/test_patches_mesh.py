@@ -128,8 +128,8 @@ WRONG = {
     "over the rim": (cylinder_mesh, (RADIUS, 0.049, 0.0), {}, "turns by"),
     "over the edge": (lambda: grid_mesh(lambda x, y: 0.0 * x), (0.029, 0.0, 0.0), {}, "edge or a hole"),
     "over a hole": (with_hole, (0.0, 0.0, 0.0), {}, "edge or a hole"),
-    "three sheets": (three_sheets, (0.005, 0.0, 0.0), {}, "no manifold"),
-    "turned faces": (turned_faces, (0.0, -0.01, 0.0), {}, "no manifold"),
+    "three sheets": (three_sheets, (0.005, 0.0, 0.0), {}, "not a manifold"),
+    "turned faces": (turned_faces, (0.0, -0.01, 0.0), {}, "not a manifold"),
     "three control points": (cylinder_mesh, ROUND, {"control_points": 3}, "control_points must be"),
     "tolerance of text": (cylinder_mesh, ROUND, {"tolerance": "small"}, "tolerance must be a number"),
 }

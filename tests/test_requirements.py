@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+import subprocess
+import sys
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -12,7 +15,9 @@ from helpers import margin_by_linear_programming
 from numpy.typing import NDArray
 
 import graspatlas as ga
+from graspatlas.problem import requirement
 from graspatlas.requirements import parse_requirement, requirement_name
+from graspatlas.requirements.base import asked
 from graspatlas.requirements.collision import CollisionChecker
 
 Array = NDArray[np.float64]
@@ -207,7 +212,7 @@ def test_text_of_requirements(text: str) -> None:
     ("text", "message"),
     [
         ("force_closer", "did you mean 'force_closure'"),
-        ("force_closure:slippery", "no number"),
+        ("force_closure:slippery", "not a number"),
         ("force_closure:-1", "friction .* must be positive"),
         ("force_closure:nan", "friction .* must be positive"),
         ("force_closure:0.5:inf", "margin .* must be finite"),
@@ -238,3 +243,35 @@ def test_requirements_are_stored_and_verified_again(can: ga.Result, tmp_path: An
     object.__setattr__(loaded, "accepted", ~can.accepted)
     del loaded.__dict__["best"]
     assert not loaded.check()
+
+
+def test_a_class_enters_itself_under_its_name():
+    """A requirement of one's own is read like those of the package, from text and from plain data."""
+    known = dict(requirement.REQUIREMENTS)
+    try:
+
+        @dataclass(frozen=True)
+        class Upright(ga.requirements.Requirement):
+            tilt: float = 0.1
+            name: ClassVar[str] = "upright"
+            cost: ClassVar[int] = 1
+
+        assert list(ga.requirements.REQUIREMENTS) == ["joint_margin", "force_closure", "upright", "collision_free"]
+        made = parse_requirement("upright:0.25")
+        assert made == Upright(0.25)
+        assert ga.requirements.requirement_from_dict(made.to_dict()) == made
+    finally:
+        requirement.REQUIREMENTS.clear()
+        requirement.REQUIREMENTS.update(known)
+
+
+def test_named_requirements_are_known_wherever_a_problem_is_read():
+    """A problem reads requirements that it does not import: any import of the package enters them."""
+    code = "from graspatlas.problem.requirement import REQUIREMENTS; print(*REQUIREMENTS)"
+    printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert printed.split() == ["joint_margin", "force_closure", "collision_free"]
+
+
+def test_what_is_only_stated_cannot_be_checked(can):
+    with pytest.raises(ga.GraspAtlasError, match="derive it from Requirement"):
+        asked(requirement.StatedRequirement(), ga.Grasps(can.problem, can.best.x))

@@ -7,6 +7,7 @@ import json
 import re
 import time
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -19,6 +20,8 @@ from graspatlas.search import GraspSearch
 from graspatlas.search.random_starts import Starts, _best_motion
 from graspatlas.search.starts_near_guess import starts_near
 
+#: The module, which its package has a function named after.
+SEARCH = import_module("graspatlas.search.find_grasps")
 PROBLEMS = ("planar_hand", "schunk_can", "schunk_oil_bottle")
 
 
@@ -229,7 +232,7 @@ def test_no_feasible_grasp(monkeypatch):
         with pytest.raises(ga.GraspAtlasError, match=r"no feasible grasp .*'schunk_can'.* tries: .*reference"):
             run(huge_can(), max_seconds=1.0)
     assert time.perf_counter() - start < 15.0
-    monkeypatch.setattr("graspatlas.search.MAX_TRIES", 50)
+    monkeypatch.setattr(SEARCH, "MAX_TRIES", 50)
     with pytest.raises(ga.GraspAtlasError, match=r"dimension 7 .* 50 tries: check that the object fits"):
         ga.optimize(huge_can(), dimension=7)
     assert ga.find_grasps(huge_can(), count=2).shape == (0, 23)
@@ -405,9 +408,7 @@ def test_only_the_first_grasp_is_sought_near_the_guess(monkeypatch):
     """Other grasps are found as without a guess, and x1 is as good as one."""
     yielded = []
     near = starts_near
-    monkeypatch.setattr(
-        "graspatlas.search.find_grasps.starts_near", lambda *a: map(lambda x: yielded.append(x) or x, near(*a))
-    )
+    monkeypatch.setattr(SEARCH, "starts_near", lambda *a: map(lambda x: yielded.append(x) or x, near(*a)))
     assert len(ga.find_grasps(guessed("schunk_can"), count=5)) == 5
     used = len(yielded)
     assert 0 < used <= 20

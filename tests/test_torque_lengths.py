@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import graspatlas as ga
 from graspatlas import patches, quality
+from graspatlas.problem.object_joint import FREE_FLYER, PLANAR
 from graspatlas.problem.torque_lengths import largest_arm
 from graspatlas.problem_files import read_problem
 from graspatlas.problems import problem_text
@@ -22,7 +23,7 @@ WEIGHING = ("ferrari_canny_epsilon", "soft_finger_epsilon", "ferrari_canny_volum
 
 
 def arm(patch: patches.Patch, *, planar: bool = False, **frozen: float) -> float:
-    return largest_arm([ga.Contact("tip", TIP, patch, frozen=frozen)], planar)
+    return largest_arm([ga.Contact("tip", TIP, patch, frozen=frozen)], PLANAR if planar else FREE_FLYER)
 
 
 @pytest.mark.parametrize("name", ga.bundled_problems())

@@ -179,7 +179,12 @@ def test_what_is_computed_on_first_use():
 
     def ask(problem: ga.Problem, atlas: ga.Atlas) -> list[Any]:
         grasps = ga.Grasps(problem, atlas.centers)
-        full = [problem.full_dimension, problem.x1_array, list(problem.hand.joint_limits), problem.hand.mechanism.A]
+        full = [
+            problem.full_dimension,
+            problem.x1_array,
+            list(problem.hand.joint_limits),
+            problem.hand.mechanism.transmission,
+        ]
         return [
             *full,
             grasps.semi_axes,

@@ -17,7 +17,8 @@ from graspatlas.atlas.status import Closed, Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasp, Grasps
 from graspatlas.hand import motions
-from graspatlas.hand.hand import Body, Hand
+from graspatlas.hand.body import Body
+from graspatlas.hand.hand import Hand
 from graspatlas.hand.motions import HandMotions
 from graspatlas.optimizer.components import Components, SearchStatus, find_components
 from graspatlas.optimizer.optimize import optimize
@@ -28,8 +29,10 @@ from graspatlas.problem.first_grasp import FirstGrasp
 from graspatlas.problem.pose_guess import PoseGuess
 from graspatlas.problem.problem import Problem
 from graspatlas.problems import bundled_problems, load_problem
-from graspatlas.quality.evaluation import batched
-from graspatlas.requirements.screening import CollisionFree, ForceClosure, JointMargin
+from graspatlas.quality.batched import batched
+from graspatlas.requirements.collision_free import CollisionFree
+from graspatlas.requirements.force_closure import ForceClosure
+from graspatlas.requirements.joint_margin import JointMargin
 from graspatlas.result.refinement import Refinement
 from graspatlas.result.result import Result, load_result
 from graspatlas.search.find_grasps import find_grasps

@@ -11,9 +11,10 @@ from scipy.optimize import minimize
 from graspatlas import _core
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.problem.problem import Problem
-from graspatlas.quality.evaluation import Quality
+from graspatlas.quality.batched import Quality
 from graspatlas.quality.evaluation import evaluate as evaluate_index
-from graspatlas.requirements.screening import Require, Requirement, screen
+from graspatlas.requirements.base import Requirement, RequirementLike
+from graspatlas.requirements.screening import screen
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.support.arrays import Array
 
@@ -40,7 +41,7 @@ class Objective:
     problem: Problem
     system: _core.GraspSystem
     quality: Quality
-    requirements: tuple[Require, ...]
+    requirements: tuple[RequirementLike, ...]
     radius: float
 
     @classmethod

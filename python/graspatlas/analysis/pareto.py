@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.quality.evaluation import Quality, quality_name
+from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.result.grasp_atlas import GraspAtlas
 
 __all__ = ["knee", "pareto_front", "values_of"]

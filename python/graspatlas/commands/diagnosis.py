@@ -135,7 +135,7 @@ def _mimics(problem: Problem) -> Iterator[Finding]:
 def _size(problem: Problem) -> Finding:
     system = problem.full_system
     mechanism = problem.hand.mechanism
-    h, w = len(mechanism.driven), sum(len(contact.free()) for contact in problem.contacts)
+    h, w = len(mechanism.actuated), sum(len(contact.free()) for contact in problem.contacts)
     which = " that mimic no other" if mechanism.mimics else ""
     text = (
         f"{h} joints{which}, {system.object_dof} freedoms of the object and {w} free patch parameters: "
@@ -161,7 +161,7 @@ def _motions(problem: Problem, k: int) -> Iterator[Finding]:
     if motions is None:
         yield Finding(OK, "hand motions", f"none; k = t = {t}, s = 0", "give some to trace fewer dimensions")
         return
-    c, h = len(motions.couplings), len(problem.hand.mechanism.driven)
+    c, h = len(motions.couplings), len(problem.hand.mechanism.actuated)
     coupled = f", {c} of them couplings" if c else ""
     hint = "a smaller k freezes more of them"
     if not motions.covariance.any():
@@ -209,14 +209,10 @@ def _with_contact(bound: str, problem: Problem) -> str:
     if not found:
         return bound
     names = [
-        f"{name} of the {side}'s patch at {contact.frame}"
+        f"{name} of the {side.name}'s patch at {contact.frame}"
         for contact in problem.contacts
-        for side, patch, frozen in (
-            ("hand", contact.hand, contact.hand_frozen),
-            ("object", contact.object, contact.frozen),
-        )
-        for name in patch.parameters
-        if name not in frozen
+        for side in contact.sides
+        for name in side.free
     ]
     return of + names[int(number)]
 
@@ -233,9 +229,9 @@ def redundant_joints(problem: Problem) -> list[list[str]]:
     Returns:
         For each independent motion the names of the joints that take part.
     """
-    driven = problem.hand.mechanism.driven
-    motions = _null_space(problem.full_system.evaluate_jacobian(_near_x1(problem))[:, : len(driven)])
-    return [[driven[j] for j in _taking_part(motion)] for motion in motions]
+    actuated = problem.hand.mechanism.actuated
+    motions = _null_space(problem.full_system.evaluate_jacobian(_near_x1(problem))[:, : len(actuated)])
+    return [[actuated[j] for j in _taking_part(motion)] for motion in motions]
 
 
 def _near_x1(problem: Problem) -> Array:
@@ -264,7 +260,7 @@ def _taking_part(motion: Array) -> list[int]:
 
 
 def _redundancies(problem: Problem) -> Iterator[Finding]:
-    h, groups = len(problem.hand.mechanism.driven), redundant_joints(problem)
+    h, groups = len(problem.hand.mechanism.actuated), redundant_joints(problem)
     J_x1, J_near = (problem.full_system.evaluate_jacobian(x) for x in (problem.x1_array, _near_x1(problem)))
     extra = len(_null_space(J_x1[:, :h])) - len(groups)
     if groups:

@@ -6,9 +6,9 @@ import argparse
 from dataclasses import fields
 
 from graspatlas.commands.arguments import Subcommands
+from graspatlas.problem.requirement import REQUIREMENTS
 from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.quality.evaluation import INDICES
-from graspatlas.requirements.screening import REQUIREMENTS
 from graspatlas.support.terminal import say
 
 __all__ = ["add_list_command"]

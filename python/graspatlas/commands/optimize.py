@@ -15,9 +15,9 @@ from graspatlas.commands.exit_status import FAILED, INTERRUPTED
 from graspatlas.commands.report import component_lines, result_lines
 from graspatlas.optimizer.components import Components, SearchStatus, find_components
 from graspatlas.optimizer.optimize import optimize
+from graspatlas.problem.requirement import parse_requirement
 from graspatlas.problems import load_problem
 from graspatlas.quality.evaluation import INDICES
-from graspatlas.requirements.screening import parse_requirement
 from graspatlas.support.files import replaced, writable_folder
 from graspatlas.support.terminal import say
 

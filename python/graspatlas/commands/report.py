@@ -6,7 +6,7 @@ from pathlib import Path
 
 from graspatlas.atlas.status import Status
 from graspatlas.optimizer.components import Components, SearchStatus
-from graspatlas.quality.evaluation import quality_name
+from graspatlas.quality.batched import quality_name
 from graspatlas.result.refinement import Refinement
 from graspatlas.result.result import Result
 from graspatlas.support.arrays import Array

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from graspatlas.grasps.grasps import Grasps
-from graspatlas.problem.contacts import Contact
 from graspatlas.support.arrays import AnyArray, Array
 from graspatlas.support.columns import joined, pose_columns
 
@@ -38,15 +37,5 @@ def contact_columns(grasps: Grasps) -> dict[str, AnyArray]:
 
 def parameter_columns(grasps: Grasps) -> dict[str, Array]:
     """The free patch parameters, which are the last numbers of x: ``contact0_hand_u`` and so on."""
-    names = [name for i, contact in enumerate(grasps.problem.contacts) for name in _parameter_names(i, contact)]
+    names = grasps.problem.parameter_names
     return {name: grasps.x[:, at - len(names)] for at, name in enumerate(names)}
-
-
-def _parameter_names(number: int, contact: Contact) -> list[str]:
-    sides = (("hand", contact.hand, contact.hand_frozen), ("object", contact.object, contact.frozen))
-    return [
-        f"contact{number}_{side}_{name}"
-        for side, patch, frozen in sides
-        for name in patch.parameters
-        if name not in frozen
-    ]

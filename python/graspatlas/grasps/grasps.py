@@ -40,7 +40,7 @@ class Grasp:
         contact_points: Contact points in the palm's frame [m, 3], metres.
         contact_normals: Outward unit normals of the object there [m, 3].
         J: Joint velocities to velocities of the contact points [3 m, h]; of joints that mimic others the columns are
-            added to those of their drivers, ``problem.hand.mechanism.driven``.
+            added to those of their drivers, ``problem.hand.mechanism.actuated``.
         G: Contact forces to the object's wrench at its origin, world axes [6, 3 m]; [3, 3 m] in the plane.
         semi_axes: Ascending semi-axes of the manipulability ellipsoid [6], lengths in millimetres; [3] in the plane.
         problem: The problem that it solves.

@@ -1,4 +1,4 @@
-"""Bodies that the user states by URDF: the hand, and the object it holds."""
+"""The hand: a body with joints, of which some may mimic others."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.hand.body import Body
 from graspatlas.hand.mechanism import Mechanism
-from graspatlas.hand.robot_files import find_file, package_folders, robots_folder
 from graspatlas.hand.urdf import (
     joint_limits,
     joints_of_kind,
@@ -23,137 +22,11 @@ from graspatlas.hand.urdf import (
     moving_joints,
     with_followers_limited,
 )
-from graspatlas.hand.urdf_checks import LARGEST, check_urdf
-from graspatlas.support.files import read_text
-from graspatlas.support.pickling import Light
+from graspatlas.hand.urdf_checks import LARGEST
+from graspatlas.support.arrays import Array
 from graspatlas.support.validation import checked_table, numbers, read_only
 
-__all__ = ["Body", "Hand", "robots_folder"]
-
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Body(Light):
-    """A thing described by a URDF.
-
-    Attributes:
-        name: Its name.
-        urdf: The URDF's text.
-        urdf_path: Where it was read, as stated.
-        package_dirs: Folders in which ``package://`` paths of meshes are looked up.
-        srdf: Text of an SRDF with pairs of links that may touch, or nothing.
-        package_paths: Those of these folders that the user named.
-    """
-
-    name: str
-    urdf: str
-    urdf_path: str = ""
-    package_dirs: tuple[str, ...] = ()
-    srdf: str = ""
-    package_paths: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        check_urdf(self.name, self.urdf)
-
-    def __repr__(self) -> str:
-        origin = self.urdf_path or f"a URDF of {len(self.urdf)} characters"
-        return f"<{type(self).__name__} {self.name!r} of {origin}>"
-
-    @property
-    def tree(self) -> str:
-        """The URDF as Pinocchio is to read it."""
-        return self.urdf
-
-    @classmethod
-    def _read(
-        cls,
-        urdf: str | Path,
-        name: str | None,
-        srdf: str | Path | None,
-        folder: Path | None,
-        package_paths: Sequence[str | Path] = (),
-    ) -> dict[str, object]:
-        stated = tuple(str((folder or Path()) / place) for place in package_paths)
-        path = find_file(urdf, folder, stated)
-        try:
-            text = read_text(path)
-            srdf_text = read_text(find_file(srdf, folder, stated)) if srdf else ""
-        except (OSError, UnicodeDecodeError) as error:
-            raise GraspAtlasError(f"cannot read '{urdf}': {error}") from None
-        return {
-            "name": name or path.stem,
-            "urdf": text,
-            "urdf_path": str(urdf),
-            "package_dirs": package_folders(path, stated),
-            "srdf": srdf_text,
-            "package_paths": stated,
-        }
-
-    @classmethod
-    def from_urdf(
-        cls,
-        urdf: str | Path,
-        *,
-        name: str | None = None,
-        srdf: str | Path | None = None,
-        folder: Path | None = None,
-        package_paths: Sequence[str | Path] = (),
-    ) -> Body:
-        """Read a body from a URDF file.
-
-        Args:
-            urdf: Path of the file; a relative one is looked up in `folder`, then in the robots of the package, and a
-                ``package://`` one in the package paths and in example-robot-data.
-            name: Name to give it; the file's by default.
-            srdf: Path of an SRDF file.
-            folder: Where relative paths start; the current folder by default.
-            package_paths: Folders in which ``package://`` paths are looked up first.
-
-        Raises:
-            GraspAtlasError: If a file is missing or cannot be read.
-        """
-        return cls(**cls._read(urdf, name, srdf, folder, package_paths))  # type: ignore[arg-type]
-
-    def to_dict(self) -> dict[str, Any]:
-        """The body as plain data, with the text of its URDF."""
-        table: dict[str, Any] = {"name": self.name, "urdf": self.urdf_path}
-        table |= {"urdf_text": self.urdf, "srdf_text": self.srdf}
-        return {**table, "package_paths": list(self.package_paths)} if self.package_paths else table
-
-    @classmethod
-    def _arguments(cls, data: Mapping[str, Any], folder: Path | None) -> dict[str, object]:
-        """Arguments from a table: read from its URDF file, or from the text that a stored problem carries."""
-        optional = ("name", "srdf", "urdf_text", "srdf_text", "package_paths")
-        table = checked_table(data, f"a {cls.__name__.lower()}", ("urdf",), optional)
-        path, name, stated = str(table["urdf"]), table.get("name"), tuple(table.get("package_paths") or ())
-        if not table.get("urdf_text"):
-            return cls._read(path, name, table.get("srdf"), folder, stated)
-        try:
-            found: Path | None = find_file(path, folder, stated)
-        except GraspAtlasError:
-            found = None
-        return {
-            "name": str(name),
-            "urdf": str(table["urdf_text"]),
-            "urdf_path": path,
-            "package_dirs": package_folders(found, stated),
-            "srdf": str(table.get("srdf_text") or ""),
-            "package_paths": stated,
-        }
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any], folder: Path | None = None) -> Body:
-        """The body that a problem file or :meth:`to_dict` describes.
-
-        Args:
-            data: ``urdf``, and perhaps ``name`` and ``srdf``.
-            folder: Where relative paths start.
-
-        Raises:
-            GraspAtlasError: If something is missing or wrong.
-        """
-        return cls(**cls._arguments(data, folder))  # type: ignore[arg-type]
+__all__ = ["Hand"]
 
 
 @dataclass(frozen=True)
@@ -172,12 +45,10 @@ class Hand(Body):
         for joint in self.limits:
             if joint not in self.joints:
                 raise unknown_name("joint", joint, self.joints, f"in hand '{self.name}'")
-            if (
-                len(numbers(self.limits[joint], f"limits of joint '{joint}'")) != 2
-                or not self.limits[joint][0] < self.limits[joint][1]
-            ):
+            lower, upper = _limits_of(joint, self.limits[joint])
+            if not lower < upper:
                 raise GraspAtlasError(f"limits of joint '{joint}' must be (lower, upper), got {self.limits[joint]}")
-            if any(LARGEST <= abs(end) < np.inf for end in self.limits[joint]):
+            if any(LARGEST <= abs(end) < np.inf for end in (lower, upper)):
                 raise GraspAtlasError(
                     f"limits of joint '{joint}' must be below {LARGEST:g} or infinite, got {self.limits[joint]}"
                 )
@@ -198,7 +69,7 @@ class Hand(Body):
     ) -> Hand:
         """Read a hand from a URDF file; see :meth:`Body.from_urdf`."""
         read = cls._read(urdf, name, srdf, folder, package_paths)
-        return cls(**read, limits=dict(limits or {}))  # type: ignore[arg-type]
+        return cls(**read, limits=dict(limits or {}))
 
     def with_joints(self, moving: Sequence[str] | None = None, locked: Mapping[str, float] | None = None) -> Hand:
         """The hand with only some joints moving, the others locked.
@@ -253,8 +124,8 @@ class Hand(Body):
         """The hand that a problem file or :meth:`to_dict` describes; see :meth:`Body.from_dict`."""
         table = dict(checked_table(data, "a hand", ("urdf",), None))
         stated = checked_table(table.pop("limits", None) or {}, "limits", (), None)
-        limits = {name: numbers(pair, f"limits of joint '{name}'") for name, pair in stated.items()}
-        return cls(**cls._arguments(table, folder), limits=limits)  # type: ignore[arg-type]
+        limits = {name: _limits_of(name, pair) for name, pair in stated.items()}
+        return cls(**cls._arguments(table, folder), limits=limits)
 
     @cached_property
     def model(self) -> _core.Model:
@@ -291,7 +162,7 @@ class Hand(Body):
         return tuple(self.model.frames)
 
     def frame(self, name: str) -> tuple[int, Array]:
-        """Joint index and placement of a frame in that joint [4, 4].
+        """Joint index and placement of a frame in that joint (4, 4).
 
         Raises:
             GraspAtlasError: If the hand has no such frame; the message names the nearest one.
@@ -304,7 +175,7 @@ class Hand(Body):
 
     @cached_property
     def joint_limits(self) -> tuple[Array, Array]:
-        """Lower and upper limits [nq each], the URDF's where `limits` does not replace them.
+        """Lower and upper limits (nq,) each, the URDF's where `limits` does not replace them.
 
         Continuous joints, whose cosine and sine stand in q, have infinite ones.
         """
@@ -328,7 +199,7 @@ class Hand(Body):
 
     @property
     def binding_limits(self) -> tuple[Array, Array]:
-        """The joint limits [nq each] without those that follow from others, because joints mimic others."""
+        """The joint limits (nq,) each without those that follow from others, because joints mimic others."""
         lower, upper = (limits.copy() for limits in self.joint_limits)
         binding = self.mechanism.binding_limits(self.limits_by_name)
         for joint in self.model.hand_joints:
@@ -336,7 +207,7 @@ class Hand(Body):
         return lower, upper
 
     def joint_steps(self, q0: Array, q1: Array) -> Array:
-        """Step of each joint from q0 [nq] to q1 [nq]: [nv], radians and metres; the shorter way round."""
+        """Step of each joint from q0 (nq,) to q1 (nq,): (nv,), radians and metres; the shorter way round."""
         steps = np.zeros(self.model.hand_v_size)
         for joint in self.model.hand_joints:
             a, b = (q[joint.q_index : joint.q_index + joint.q_size] for q in (q0, q1))
@@ -345,8 +216,8 @@ class Hand(Body):
             steps[joint.v_index] = step
         return steps
 
-    def joint_positions(self, q: NDArray[np.float64]) -> dict[str, float]:
-        """Position of each joint with one degree of freedom [rad or m], from q [nq]."""
+    def joint_positions(self, q: Array) -> dict[str, float]:
+        """Position of each joint with one degree of freedom [rad or m], from q (nq,)."""
         positions = {}
         for joint in self.model.hand_joints:
             at = joint.q_index
@@ -356,6 +227,18 @@ class Hand(Body):
                 positions[joint.name] = float(np.arctan2(q[at + 1], q[at]))
         return positions
 
-    def link_placements(self, q: NDArray[np.float64]) -> dict[str, Array]:
-        """T_palm_link [4, 4] of every link and frame at joint configuration q [nq]."""
+    def link_placements(self, q: Array) -> dict[str, Array]:
+        """T_palm_link (4, 4) of every link and frame at joint configuration q (nq,)."""
         return {name: np.asarray(T) for name, T in self.model.frame_placements(np.asarray(q, float)).items()}
+
+
+def _limits_of(joint: str, pair: object) -> tuple[float, float]:
+    """Two numbers, the limits of a joint [rad or m].
+
+    Raises:
+        GraspAtlasError: If they are not.
+    """
+    ends = numbers(pair, f"limits of joint '{joint}'")
+    if len(ends) != 2:
+        raise GraspAtlasError(f"limits of joint '{joint}' must be (lower, upper), got {pair}")
+    return ends[0], ends[1]

@@ -12,16 +12,16 @@ from functools import cached_property
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.motions import HandMotions
+from graspatlas.support.arrays import Array
 from graspatlas.support.pickling import Light
+from graspatlas.support.renamed import renamed_attribute
 from graspatlas.support.validation import read_only
 
 __all__ = ["Mechanism", "Mimic", "read_mimics"]
-
-Array = NDArray[np.float64]
 
 #: How far a stated position of a joint that mimics another may be from where it must be, being rounded [rad or m].
 STATED_TOLERANCE = 1e-3
@@ -115,11 +115,11 @@ def _check_kinds(mimic: Mimic, kind: str, driver: str) -> None:
 
 @dataclass(frozen=True)
 class Mechanism(Light):
-    """How the joints of a hand depend on those that drive them: q = A q_driven + b.
+    """How the joints of a hand depend on the actuated ones: q = A q_actuated + b.
 
     Attributes:
-        joints: Names of all joints, in the order of q [h].
-        mimics: The joints that mimic others [m].
+        joints: Names of all joints, in the order of q (h,).
+        mimics: The joints that mimic others, m of them.
     """
 
     joints: tuple[str, ...]
@@ -134,28 +134,31 @@ class Mechanism(Light):
         return {mimic.joint: mimic for mimic in self.mimics}
 
     @cached_property
-    def driven(self) -> tuple[str, ...]:
-        """Names of the joints that move by themselves, in the order of q [d], d = h - m."""
+    def actuated(self) -> tuple[str, ...]:
+        """Names of the joints that mimic no other, in the order of q (d,), d = h - m."""
         return tuple(name for name in self.joints if name not in self.followers)
 
     @cached_property
-    def A(self) -> Array:
-        """Joint velocities that the unit velocity of each driven joint makes [h, d]; its columns share no row."""
-        A = np.zeros((len(self.joints), len(self.driven)))
+    def transmission(self) -> Array:
+        """A: joint velocities that the unit velocity of each actuated joint makes (h, d); its columns share no row."""
+        A = np.zeros((len(self.joints), len(self.actuated)))
         for row, name in zip(A, self.joints, strict=True):
             mimic = self.followers.get(name)
-            row[self.driven.index(mimic.driver if mimic else name)] = mimic.multiplier if mimic else 1.0
+            row[self.actuated.index(mimic.driver if mimic else name)] = mimic.multiplier if mimic else 1.0
         return read_only(A)
+
+    driven = renamed_attribute("driven", "actuated")
+    A = renamed_attribute("A", "transmission")
 
     @cached_property
     def b(self) -> Array:
-        """Joint positions where all driven joints are at 0 [h], radians and metres."""
+        """Joint positions where all actuated joints are at 0 (h,), radians and metres."""
         offsets = [self.followers[name].offset if name in self.followers else 0.0 for name in self.joints]
         return read_only(np.array(offsets))
 
     @cached_property
     def rows(self) -> Array:
-        """Coefficients [m, h] of q in q_joint - multiplier q_driver = offset."""
+        """Coefficients (m, h) of q in q_joint - multiplier q_driver = offset."""
         rows = np.zeros((len(self.mimics), len(self.joints)))
         for row, mimic in zip(rows, self.mimics, strict=True):
             row[self.joints.index(mimic.joint)] = 1.0
@@ -189,7 +192,7 @@ class Mechanism(Light):
         return full
 
     def residual(self, positions: ArrayLike) -> Array:
-        """By how much joint positions [n, h] break the equations of the mimics [n, m], radians and metres."""
+        """By how much joint positions (n, h) break the equations of the mimics (n, m), radians and metres."""
         offsets = np.array([mimic.offset for mimic in self.mimics])
         off = np.atleast_2d(np.asarray(positions, float)) @ self.rows.T - offsets
         turns = np.array([mimic.turns for mimic in self.mimics], bool)
@@ -235,7 +238,7 @@ class Mechanism(Light):
         return HandMotions(self.joints, ordered.mean, ordered.covariance, rows)
 
     def ranges(self, limits: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-        """Where each driven joint can be, given its limits and those of the joints that mimic it [rad or m].
+        """Where each actuated joint can be, given its limits and those of the joints that mimic it [rad or m].
 
         Args:
             limits: Lower and upper limits of all joints, by name.
@@ -244,7 +247,7 @@ class Mechanism(Light):
             GraspAtlasError: If the limits of a joint that mimics another leave that one no range.
         """
         ranges = {}
-        for driver in self.driven:
+        for driver in self.actuated:
             (low, (of_low, _)), (high, (of_high, _)) = (self._tightest(driver, side, limits) for side in (0, 1))
             ranges[driver] = low, high
             if not low < high and {of_low, of_high} != {driver}:
@@ -262,7 +265,7 @@ class Mechanism(Light):
             limits: Lower and upper limits of all joints, by name [rad or m].
         """
         binding = {name: [-np.inf, np.inf] for name in limits}
-        for driver in self.driven:
+        for driver in self.actuated:
             for side in (0, 1):
                 _, (joint, its) = self._tightest(driver, side, limits)
                 binding[joint][its] = limits[joint][its]
@@ -271,7 +274,7 @@ class Mechanism(Light):
     def _tightest(
         self, driver: str, side: int, limits: Mapping[str, tuple[float, float]]
     ) -> tuple[float, tuple[str, int]]:
-        """Lower (side 0) or upper end (1) of a driven joint's range; and whose limit that is, the upper one or not."""
+        """Lower (side 0) or upper end (1) of an actuated joint's range; whose limit that is, and which of its two."""
         tightest, owner = limits[driver][side], (driver, side)
         for mimic in self.mimics:
             if mimic.driver != driver or mimic.multiplier == 0.0:

@@ -1,4 +1,4 @@
-"""Mesh files of a URDF, looked at before a collision library does: that one takes what is no number for a place."""
+"""Mesh files of a URDF, looked at before a collision library does: that one takes NaN for a place."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.robot_files import PACKAGE
 from graspatlas.hand.urdf_checks import LARGEST
+from graspatlas.support.arrays import Array
 from graspatlas.support.files import is_file, read_text
 
 if TYPE_CHECKING:
-    from graspatlas.hand.hand import Body
+    from graspatlas.hand.body import Body
 
 __all__ = ["check_meshes"]
 
@@ -60,7 +60,8 @@ def _check(body: str, path: Path) -> None:
     if not sound.all():
         first = ", ".join(f"{number:g}" for number in corners[np.flatnonzero(~sound)[0]])
         raise GraspAtlasError(
-            f"mesh '{path}' of '{body}' has {(~sound).sum()} corners that are no places, as ({first}): save it anew"
+            f"mesh '{path}' of '{body}' has {(~sound).sum()} corners that are not finite numbers, such as ({first}): "
+            "save it again"
         )
     spread = corners - corners.mean(axis=0) if len(corners) else np.zeros((1, 3))
     sizes = np.linalg.svd(spread.T @ spread, compute_uv=False) ** 0.5
@@ -68,8 +69,8 @@ def _check(body: str, path: Path) -> None:
         raise GraspAtlasError(f"mesh '{path}' of '{body}' has no area: its corners lie in one point or line")
 
 
-def _corners(path: Path) -> NDArray[np.float64] | None:
-    """Corners of the triangles of a mesh [n, 3], in its own unit; None where the format is not known here."""
+def _corners(path: Path) -> Array | None:
+    """Corners of the triangles of a mesh (n, 3), in its own unit; None where the format is not known here."""
     kind = path.suffix.lower()
     if kind == ".stl":
         return _stl_corners(path)
@@ -79,7 +80,7 @@ def _corners(path: Path) -> NDArray[np.float64] | None:
     return np.array(rows, float).reshape(-1, 3)
 
 
-def _stl_corners(path: Path) -> NDArray[np.float64] | None:
+def _stl_corners(path: Path) -> Array | None:
     """Corners in an STL file, binary or text; None where it is neither, which whoever reads it says."""
     size = path.stat().st_size
     with path.open("rb") as stream:

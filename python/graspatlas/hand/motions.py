@@ -8,14 +8,13 @@ from numbers import Integral
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.support.arrays import Array
 from graspatlas.support.validation import checked_instance, checked_table, number, number_array, read_only
 
 __all__ = ["HandMotions", "coupling_rows"]
-
-Array = NDArray[np.float64]
 
 #: Joint positions are smaller [rad or m]: larger ones are mistakes, and their squares may overflow.
 LARGEST = 1e9
@@ -28,10 +27,10 @@ class HandMotions:
     .. math:: T T^\top = E S^2 E^\top
 
     Attributes:
-        joints: Names of the joints, in the order of all arrays below [h].
-        mean: Mean configuration [h], radians.
-        covariance: Their covariance [h, h]; only its eigenvectors and the order of its eigenvalues matter.
-        couplings: Coefficients [c, h] of joints whose sum keeps its value: a row of index_dip 1 and index_pip -0.7 lets
+        joints: Names of the joints, in the order of all arrays below (h,).
+        mean: Mean configuration (h,), radians.
+        covariance: Their covariance (h, h); only its eigenvectors and the order of its eigenvalues matter.
+        couplings: Coefficients (c, h) of joints whose sum keeps its value: a row of index_dip 1 and index_pip -0.7 lets
             the one turn by 0.7 of what the other turns. They are always frozen, before all other motions, and count
             among the s of eq (12). They narrow R, not F: what the mechanism couples belongs into the hand's URDF, as a
             ``<mimic>`` tag.
@@ -86,8 +85,8 @@ class HandMotions:
         """Hand motions of recorded configurations.
 
         Args:
-            samples: One configuration a row [z, h], radians; at least two rows.
-            joints: Names of the joints [h].
+            samples: One configuration a row (z, h), radians; at least two rows.
+            joints: Names of the joints (h,).
 
         Raises:
             GraspAtlasError: If the samples have another shape or hold NaN.
@@ -106,7 +105,7 @@ class HandMotions:
 
         Args:
             couplings: Coefficients by joint name, one table for each coupling; see ``couplings`` above.
-            joints: Names of all joints [h].
+            joints: Names of all joints (h,).
 
         Raises:
             GraspAtlasError: If there is no such joint, or the couplings are not independent.
@@ -116,7 +115,7 @@ class HandMotions:
 
     @property
     def variances(self) -> Array:
-        """Variance along each motion, decreasing [h]; those of the couplings last."""
+        """Variance along each motion, decreasing (h,); those of the couplings last."""
         if not len(self.couplings):
             return np.asarray(np.linalg.eigvalsh(self.covariance)[::-1])
         E = self.E
@@ -124,7 +123,7 @@ class HandMotions:
 
     @property
     def E(self) -> Array:
-        """Motions as orthonormal columns, largest variance first, then the couplings [h, h].
+        """Motions as orthonormal columns, largest variance first, then the couplings (h, h).
 
         The largest entry of each is positive.
         """
@@ -140,12 +139,12 @@ class HandMotions:
         return np.asarray(E * np.sign(E[largest, np.arange(E.shape[1])]))
 
     def kept(self, s: int) -> Array:
-        """The motions that stay when the s least important are frozen [h, h - s]."""
+        """The motions that stay when the s least important are frozen (h, h - s)."""
         self.check_frozen(s)
         return np.ascontiguousarray(self.E[:, : len(self.joints) - s])
 
     def frozen(self, s: int) -> Array:
-        """E_s of eq (13): the s least important motions [h, s]."""
+        """E_s of eq (13): the s least important motions (h, s)."""
         self.check_frozen(s)
         return np.ascontiguousarray(self.E[:, len(self.joints) - s :])
 
@@ -206,14 +205,14 @@ class HandMotions:
 
 
 def coupling_rows(couplings: Sequence[Mapping[str, float]], joints: Sequence[str]) -> Array:
-    """The matrix [c, h] of couplings that are stated as coefficients by joint name.
+    """The matrix (c, h) of couplings that are stated as coefficients by joint name.
 
     Args:
         couplings: One table for each coupling.
-        joints: Names of the joints [h].
+        joints: Names of the joints (h,).
 
     Raises:
-        GraspAtlasError: If there is no such joint, or a coefficient is no number.
+        GraspAtlasError: If there is no such joint, or a coefficient is not a number.
     """
     rows = np.zeros((len(couplings), len(joints)))
     for row, table in zip(rows, couplings, strict=True):

@@ -7,11 +7,11 @@ from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.mechanism import Mimic, read_mimics
+from graspatlas.support.arrays import Array
 
 __all__ = [
     "box_urdf",
@@ -28,7 +28,6 @@ __all__ = [
     "with_followers_limited",
 ]
 
-Array = NDArray[np.float64]
 #: Joints that move with one degree of freedom.
 TURNING, SLIDING = ("revolute", "continuous"), ("prismatic",)
 #: Two positions of a locked joint that differ by less are the same [rad or m].
@@ -214,7 +213,7 @@ def sphere_urdf(name: str, radius: float) -> str:
 
 
 def box_urdf(name: str, size: Iterable[float]) -> str:
-    """URDF of a box about the origin; `size` [3] are its edges along x, y and z [m]."""
+    """URDF of a box about the origin; `size` (3,) are its edges along x, y and z [m]."""
     return _one_link(name, f'<box size="{_words(size)}"/>')
 
 
@@ -224,7 +223,7 @@ def cylinder_urdf(name: str, radius: float, length: float) -> str:
 
 
 def mesh_urdf(name: str, filename: str, scale: Iterable[float]) -> str:
-    """URDF of a mesh; `filename` as URDFs name them, `scale` [3] from the mesh's unit to metres."""
+    """URDF of a mesh; `filename` as URDFs name them, `scale` (3,) from the mesh's unit to metres."""
     return _one_link(name, f'<mesh filename={quoteattr(filename)} scale="{_words(scale)}"/>')
 
 

@@ -26,7 +26,7 @@ from graspatlas.optimizer.optimize import optimize
 from graspatlas.optimizer.options import OptimizeOptions, with_defaults
 from graspatlas.problem.problem import Problem
 from graspatlas.result.result import Result
-from graspatlas.search.find_grasps import MAX_SPECIAL, GraspSearch
+from graspatlas.search.find_grasps import MAX_SINGULAR, GraspSearch
 from graspatlas.support.deadlines import deadline_after
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.progress import progress_bar
@@ -214,7 +214,7 @@ def _trace_all(
             if x is None:
                 late = time.perf_counter() > traced.deadline
                 return SearchStatus.TIME_LIMIT if late else SearchStatus.NO_GRASP
-            if not traced.take(search, x) and traced.special >= MAX_SPECIAL:
+            if not traced.take(search, x) and traced.singular >= MAX_SINGULAR:
                 if traced.results:
                     return SearchStatus.NO_GRASP
                 traced.trace(search.problem.at(x))  # says why no atlas can grow
@@ -229,24 +229,24 @@ class _Tracer:
         self.options, self.deadline, self.progress = options, deadline, progress
         self.results: list[Result] = []
         self.hits: list[int] = []
-        self.covered = self.holes = self.special = 0
+        self.covered = self.holes = self.singular = 0
         self.interrupted = False
 
     def take(self, search: GraspSearch, x: Array) -> bool:
         """Count a grasp that was found to the component that covers it, or trace its component.
 
-        False for a special grasp that none covers: no atlas can grow from it.
+        False for a singular grasp that none covers: no atlas can grow from it.
         """
         for i, result in enumerate(self.results):
             if _covers(result.atlas, x):
                 self.hits[i] += 1
                 self.covered += 1
-                self.special = 0
+                self.singular = 0
                 return True
         if not search.is_regular(x):
-            self.special += 1
+            self.singular += 1
             return False
-        self.covered = self.special = 0
+        self.covered = self.singular = 0
         self.hits[self.trace(search.problem.at(x))] += 1
         return True
 

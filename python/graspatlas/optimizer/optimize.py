@@ -18,8 +18,8 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.optimizer.options import several_indices, with_defaults
 from graspatlas.optimizer.readings import Reading, check_atlas_of
 from graspatlas.problem.problem import Problem
-from graspatlas.quality.evaluation import Quality
-from graspatlas.requirements.screening import Require
+from graspatlas.quality.batched import Quality
+from graspatlas.requirements.base import RequirementLike
 from graspatlas.result.result import Result
 from graspatlas.search.find_grasps import with_first_grasp
 from graspatlas.support.deadlines import seconds_until
@@ -40,7 +40,7 @@ def optimize(
     radius: float | None = None,
     epsilon: float | None = None,
     quality: Quality | Sequence[Quality] | None = None,
-    require: Sequence[Require] | None = None,
+    require: Sequence[RequirementLike] | None = None,
     refine: bool | str = False,
     refine_steps: int = MAX_STEPS,
     checkpoint: str | os.PathLike[str] | None = None,

@@ -8,8 +8,9 @@ from typing import TypedDict
 from graspatlas.atlas.limits import LimitOptions
 from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.problem import Problem
-from graspatlas.quality.evaluation import Quality, find_index, quality_name
-from graspatlas.requirements.screening import Require
+from graspatlas.quality.batched import Quality, quality_name
+from graspatlas.quality.evaluation import find_index
+from graspatlas.requirements.base import RequirementLike
 
 __all__ = ["Choices", "OptimizeOptions", "several_indices", "with_defaults"]
 
@@ -21,7 +22,7 @@ class OptimizeOptions(LimitOptions, total=False):
     radius: float | None
     epsilon: float | None
     quality: Quality | Sequence[Quality] | None
-    require: Sequence[Require] | None
+    require: Sequence[RequirementLike] | None
     refine: bool | str
     refine_steps: int
 

@@ -16,8 +16,11 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.callables import is_batched
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.problem.problem import Problem
-from graspatlas.quality.evaluation import Quality, evaluate, quality_name
-from graspatlas.requirements.screening import Require, Requirement, check_requirements, screen
+from graspatlas.problem.requirement import StatedRequirement
+from graspatlas.quality.batched import Quality, quality_name
+from graspatlas.quality.evaluation import evaluate
+from graspatlas.requirements.base import RequirementLike
+from graspatlas.requirements.screening import check_requirements, screen
 from graspatlas.result.result import Result
 from graspatlas.support.validation import checked_instance, shown
 
@@ -43,7 +46,7 @@ class Reading:
     """
 
     indices: Sequence[Quality]
-    requirements: Sequence[Require]
+    requirements: Sequence[RequirementLike]
 
     def __post_init__(self) -> None:
         check_requirements(self.requirements)
@@ -85,7 +88,7 @@ class Reading:
             if callable(index) and not is_batched(index):
                 evaluate(index, grasp)
         for requirement in self.requirements:
-            if not isinstance(requirement, Requirement) and not is_batched(requirement):
+            if not isinstance(requirement, StatedRequirement) and not is_batched(requirement):
                 screen([requirement], grasp)
 
     def seconds_each(self, problem: Problem, system: _core.GraspSystem, x: NDArray[np.float64]) -> float:

@@ -7,15 +7,15 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
+from graspatlas.support.arrays import Array
 from graspatlas.support.validation import number, number_array
 
 __all__ = ["AxialPatch", "FlippablePatch", "Patch"]
 
-Array = NDArray[np.float64]
 Vector3 = tuple[float, float, float]
 Interval = tuple[float, float]
 EVERYWHERE: Interval = (-np.inf, np.inf)
@@ -55,11 +55,12 @@ def checked_angles(value: Sequence[float], what: str) -> Interval:
     return (low, high)
 
 
-def checked_length(value: Any, what: str) -> float:
+def checked_length(value: object, what: str) -> float:
     """A positive finite number."""
-    if not 0.0 < number(value, what) < LARGEST:
+    length = number(value, what)
+    if not 0.0 < length < LARGEST:
         raise GraspAtlasError(f"{what} must be positive and below {LARGEST:g}, got {value!r}")
-    return float(value)
+    return length
 
 
 def checked_pair(value: Sequence[float], what: str) -> tuple[float, float]:
@@ -71,7 +72,7 @@ def checked_pair(value: Sequence[float], what: str) -> tuple[float, float]:
 
 
 def placement(origin: Vector3, y_axis: Vector3, x_hint: Vector3) -> Array:
-    """Frame [4, 4] at an origin with its y axis given and its x axis as near as can be to a hint."""
+    """Frame (4, 4) at an origin with its y axis given and its x axis as near as can be to a hint."""
     y = np.array(y_axis)
     x = np.array(x_hint) - np.dot(x_hint, y) * y
     if np.linalg.norm(x) < 1e-6:
@@ -99,7 +100,7 @@ class Patch:
         raise NotImplementedError
 
     def locate(self, point: ArrayLike) -> tuple[float, float]:
-        """Parameters (u, v) of the patch's point nearest to a point of the body's frame [3]."""
+        """Parameters (u, v) of the patch's point nearest to a point of the body's frame (3,)."""
         raise NotImplementedError
 
     def core(self) -> _core.Patch:
@@ -107,11 +108,11 @@ class Patch:
         raise NotImplementedError
 
     def point(self, u: float = 0.0, v: float = 0.0) -> Array:
-        """Point o(u, v) in the body's frame [3]."""
+        """Point o(u, v) in the body's frame (3,)."""
         return np.asarray(self.core().evaluate(u, v)["o"])
 
     def normal_at(self, u: float = 0.0, v: float = 0.0) -> Array:
-        """Outward unit normal m(u, v) in the body's frame [3]."""
+        """Outward unit normal m(u, v) in the body's frame (3,)."""
         return np.asarray(self.core().evaluate(u, v)["m"])
 
     def to_dict(self) -> dict[str, Any]:
@@ -168,11 +169,11 @@ class AxialPatch(FlippablePatch):
 
     @property
     def _frame(self) -> Array:
-        """Placement [4, 4]: x along u = 0, y along the axis."""
+        """Placement (4, 4): x along u = 0, y along the axis."""
         return placement(self.origin, self.axis, self.u_axis)
 
     def _local(self, point: ArrayLike) -> Array:
-        """A point of the body's frame in the placement [3]."""
+        """A point of the body's frame in the placement (3,)."""
         T = self._frame
         return np.asarray(T[:3, :3].T @ (np.asarray(point, float) - T[:3, 3]))
 

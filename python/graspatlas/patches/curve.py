@@ -12,8 +12,9 @@ from scipy.interpolate import CubicSpline
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
-from graspatlas.patches.base import Array, Interval, Patch
+from graspatlas.patches.base import Interval, Patch
 from graspatlas.patches.nearest import nearest_parameters
+from graspatlas.support.arrays import Array
 from graspatlas.support.validation import number_array
 
 __all__ = ["Curve"]
@@ -35,7 +36,7 @@ class Curve(Patch):
 
     Attributes:
         patch: A patch with two parameters.
-        points: Parameters (u, v) of points on it [n, 2], in their order along the curve.
+        points: Parameters (u, v) of points on it (n, 2), in their order along the curve.
     """
 
     patch: Patch
@@ -58,7 +59,7 @@ class Curve(Patch):
         self._check_within()
 
     def _lengths(self) -> Array:
-        """Lengths on the patch of the straight lines between the points in the parameters [n - 1]."""
+        """Lengths on the patch of the straight lines between the points in the parameters (n - 1,)."""
         core, points = self.patch.core(), np.array(self.points)
         lengths = []
         for start, end in pairwise(points):

@@ -8,20 +8,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline as SplineBasis
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.patches.base import Array, Vector3, checked_length, checked_vector, placement
+from graspatlas.patches.base import Vector3, checked_length, checked_vector, placement
 from graspatlas.patches.spline import BSpline, clamped_knots
+from graspatlas.support.arrays import Array, BoolArray, IntArray
 from graspatlas.support.files import is_file
 from graspatlas.support.validation import whole
 
 __all__ = ["FitReport", "patch_from_mesh"]
 
-Indices = NDArray[np.int64]
+Indices = IntArray
 
 #: Degree of the fitted spline.
 DEGREE = 3
@@ -81,7 +82,7 @@ def patch_from_mesh(
     Args:
         mesh: A file that trimesh reads (STL, OBJ, PLY, OFF, ...), or a ``trimesh.Trimesh``; in metres, with faces that
             turn counter-clockwise seen from outside.
-        center: Where, in the mesh's frame [3], within ``size`` of the mesh.
+        center: Where, in the mesh's frame (3,), within ``size`` of the mesh.
         size: How far the patch reaches along u and v [m].
         u_axis: Direction of u, made parallel to the tangent plane.
         control_points: Number of control points along u and along v, at least 4.
@@ -91,7 +92,7 @@ def patch_from_mesh(
         The patch, with its outward normal that of the faces, and how well it fits.
 
     Raises:
-        GraspAtlasError: If trimesh is not installed, an argument makes no sense, or the region is no graph over its
+        GraspAtlasError: If trimesh is not installed, an argument is wrong, or the region is not a graph over its
             tangent plane: it has a hole or an edge, is not a manifold, or turns by more than 80 degrees; or the patch
             misses the mesh by more than the tolerance.
     """
@@ -140,7 +141,7 @@ def _trimesh() -> Any:
 
 
 def _loaded(mesh: Any) -> tuple[Array, Indices]:
-    """Vertices [v, 3] and faces [n, 3] of a mesh, with equal vertices made one."""
+    """Vertices (v, 3) and faces (n, 3) of a mesh, with equal vertices made one."""
     trimesh = _trimesh()
     if isinstance(mesh, str | Path):
         path = Path(mesh)
@@ -162,18 +163,18 @@ def _loaded(mesh: Any) -> tuple[Array, Indices]:
 
 
 def _edges(triangles: Array) -> tuple[Array, Array]:
-    """The two edges from the first corner of triangles [n, 3, 3]."""
+    """The two edges from the first corner of triangles (n, 3, 3)."""
     return triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
 
 
 def _normals(triangles: Array) -> Array:
-    """Unit normals of triangles [n, 3]."""
+    """Unit normals of triangles (n, 3)."""
     across = np.cross(*_edges(triangles))
     return np.asarray(across / np.linalg.norm(across, axis=1, keepdims=True))
 
 
 def _tangent_frame(triangles: Array, center: Array, half: float, u_hint: Vector3) -> tuple[int, Array, Array]:
-    """The face nearest to the centre, its nearest point [3], and the axes of u, v and the normal there [3, 3]."""
+    """The face nearest to the centre, its nearest point (3,), and the axes of u, v and the normal there (3, 3)."""
     nearest_points = _trimesh().triangles.closest_point(triangles, np.tile(center, (len(triangles), 1)))
     distances = np.linalg.norm(nearest_points - center, axis=1)
     nearest = int(np.argmin(distances))
@@ -193,7 +194,7 @@ def _tangent_frame(triangles: Array, center: Array, half: float, u_hint: Vector3
 
 
 def _region(corners: Array, faces: Indices, nearest: int, half: float) -> Indices:
-    """Faces [m, 3] over the square of the patch that hang together with the nearest one, checked to be a manifold."""
+    """Faces (m, 3) over the square of the patch that hang together with the nearest one, checked to be a manifold."""
     over = np.flatnonzero(_overlapping(corners[faces][:, :, :2], half))
     directed = faces[over][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     edges = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True)[1].reshape(-1)
@@ -204,14 +205,14 @@ def _region(corners: Array, faces: Indices, nearest: int, half: float) -> Indice
     directed = directed[np.repeat(mine, 3)]
     if len(np.unique(directed, axis=0)) < len(directed):
         raise GraspAtlasError(
-            "the mesh is no manifold within size of the centre: an edge has three faces, or neighbouring faces turn "
+            "the mesh is not a manifold within size of the centre: an edge has three faces, or neighbouring faces turn "
             "different ways; repair the mesh"
         )
     return np.asarray(faces[over[mine]])
 
 
-def _overlapping(triangles: Array, half: float) -> NDArray[np.bool_]:
-    """Which triangles of the plane [n, 3, 2] overlap the square: those that no side of either separates from it."""
+def _overlapping(triangles: Array, half: float) -> BoolArray:
+    """Which triangles of the plane (n, 3, 2) overlap the square: those that no side of either separates from it."""
     apart = (triangles.min(axis=1) > half).any(axis=1) | (triangles.max(axis=1) < -half).any(axis=1)
     for i in range(3):
         side = triangles[:, (i + 1) % 3] - triangles[:, i]
@@ -223,7 +224,7 @@ def _overlapping(triangles: Array, half: float) -> NDArray[np.bool_]:
 
 
 def _heights(triangles: Array, ticks: Array, half: float) -> Array:
-    """Heights of the triangles over a grid of points of the tangent plane [SAMPLES, SAMPLES]."""
+    """Heights of the triangles over a grid of points of the tangent plane (SAMPLES, SAMPLES)."""
     heights = np.full((len(ticks), len(ticks)), np.nan)
     low = np.searchsorted(ticks, triangles[:, :, :2].min(axis=1) - ON_EDGE * half)
     high = np.searchsorted(ticks, triangles[:, :, :2].max(axis=1) + ON_EDGE * half)
@@ -251,7 +252,7 @@ def _heights(triangles: Array, ticks: Array, half: float) -> Array:
 
 
 def _fitted(heights: Array, ticks: Array, knots: Array) -> Array:
-    """Heights of the control net [n, n]: least squares along u and along v, with a penalty on second differences."""
+    """Heights of the control net (n, n): least squares along u and along v, with a penalty on second differences."""
     A = SplineBasis.design_matrix(ticks, knots, DEGREE).toarray()
     D = np.diff(np.eye(A.shape[1]), 2, axis=0)
     S = np.linalg.solve(A.T @ A + SMOOTHING * D.T @ D, A.T)
@@ -259,6 +260,6 @@ def _fitted(heights: Array, ticks: Array, knots: Array) -> Array:
 
 
 def _gaps(net: Array, knots: Array, points: Array) -> Array:
-    """Heights of points (u, v, height) [n, 3] over the spline [n]."""
+    """Heights of points (u, v, height) (n, 3) over the spline (n,)."""
     u, v = (SplineBasis.design_matrix(points[:, i], knots, DEGREE).toarray() for i in range(2))
     return np.asarray(points[:, 2] - np.einsum("ni,ij,nj->n", u, net, v))

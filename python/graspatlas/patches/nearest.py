@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from graspatlas import _core
-from graspatlas.patches.base import Array, Interval
+from graspatlas.patches.base import Interval
+from graspatlas.support.arrays import Array
 
 __all__ = ["nearest_parameters"]
 
@@ -27,7 +28,7 @@ def nearest_parameters(
 
     Args:
         core: The patch.
-        point: A point in its frame [3].
+        point: A point in its frame (3,).
         search: Finite interval of each free parameter, u or u and v, in which the grid lies.
         limits: Intervals that the answer must keep.
 

@@ -85,7 +85,7 @@ class Sphere(_Globe):
             half_angle: Largest longitude and latitude [rad], below pi/2.
 
         Raises:
-            GraspAtlasError: If a value makes no sense.
+            GraspAtlasError: If a value is out of its range.
         """
         n = np.array(checked_vector(normal, "normal", unit=True))
         center = np.array(checked_vector(position, "position")) - checked_length(radius, "radius") * n

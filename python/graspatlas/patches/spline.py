@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import product
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
-from graspatlas.patches.base import LARGEST, Array, FlippablePatch, Interval, Vector3, checked_interval
+from graspatlas.patches.base import LARGEST, FlippablePatch, Interval, Vector3, checked_interval
 from graspatlas.patches.nearest import nearest_parameters
+from graspatlas.support.arrays import Array
 from graspatlas.support.validation import number_array
 
 __all__ = ["BSpline", "Bezier"]
@@ -109,7 +110,7 @@ class Bezier(_TensorProduct):
     """A tensor-product Bezier patch: u and v run from 0 to 1, and the patch passes through its corner points.
 
     Attributes:
-        control_points: P [p, q, 3], u along the first axis and v along the second; degrees are p - 1 and q - 1 [m].
+        control_points: P (p, q, 3), u along the first axis and v along the second; degrees are p - 1 and q - 1 [m].
         u_interval, v_interval: Parts of (0, 1); all of it by default.
         flipped: False for the outward normal along o_u x o_v, True for its opposite.
 
@@ -140,9 +141,9 @@ class BSpline(_TensorProduct):
     It is not periodic: a closed surface has a seam that no grasp crosses.
 
     Attributes:
-        control_points: P [p, q, 3], u along the first axis and v along the second [m].
+        control_points: P (p, q, 3), u along the first axis and v along the second [m].
         degrees: Degrees of u and v, 3 by default: below 3 the Jacobian of the contact jumps at the knots.
-        u_knots, v_knots: Knots [p + degree + 1], [q + degree + 1], not descending; by default evenly spaced from 0 to
+        u_knots, v_knots: Knots (p + degree + 1,), (q + degree + 1,), not descending; by default evenly spaced from 0 to
             1, with the ends repeated so that the patch passes through its corner points.
         u_interval, v_interval: Parts of the domains, ``knots[degree]`` to ``knots[p]``; all of them by default.
         unit: ``"number"``, or ``"m"`` when the knots are lengths [m], so that u and v are measured as such.
@@ -180,12 +181,12 @@ class BSpline(_TensorProduct):
 
 
 def clamped_knots(count: int, degree: int, low: float = 0.0, high: float = 1.0) -> Array:
-    """Evenly spaced knots [count + degree + 1] whose ends come degree + 1 times."""
+    """Evenly spaced knots (count + degree + 1,) whose ends come degree + 1 times."""
     inner = np.linspace(low, high, count - degree + 1)
     return np.concatenate([np.full(degree, low), inner, np.full(degree, high)])
 
 
-def _checked_degrees(value: Any) -> tuple[int, int]:
+def _checked_degrees(value: object) -> tuple[int, int]:
     degrees = tuple(value) if isinstance(value, tuple | list) else ()
     if len(degrees) != 2 or not all(
         isinstance(d, int) and not isinstance(d, bool) and 1 <= d <= MAX_DEGREE for d in degrees

@@ -14,18 +14,18 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.patches.base import (
     EVERYWHERE,
     LARGEST,
-    Array,
     AxialPatch,
     Interval,
     angle_within,
     checked_length,
     checked_pair,
 )
+from graspatlas.support.arrays import Array
 from graspatlas.support.validation import number_array
 
 __all__ = ["Cone", "Cylinder", "Revolution"]
 
-#: Heights of an outline are farther apart [m], or its slope would be no number.
+#: Heights of an outline are farther apart [m], or its slope would not be finite.
 CLOSEST = 1e-9
 
 
@@ -40,7 +40,7 @@ class TurnedPatch(AxialPatch):
             raise GraspAtlasError(f"the radius is negative in v_interval ({low:g}, {high:g}): end it before the apex")
 
     def outline(self) -> tuple[Array, Array]:
-        """Breaks [n + 1] and cubic coefficients [n, 4], lowest power first, of the radius over v."""
+        """Breaks (n + 1,) and cubic coefficients (n, 4), lowest power first, of the radius over v."""
         raise NotImplementedError
 
     def default_v_interval(self) -> Interval:
@@ -146,8 +146,8 @@ class Revolution(TurnedPatch):
     """A surface of revolution whose radius is a cubic spline through given points.
 
     Attributes:
-        heights: Heights along the axis [n], ascending [m].
-        radii: Radius at each height [n], positive [m].
+        heights: Heights along the axis (n,), ascending [m].
+        radii: Radius at each height (n,), positive [m].
         origin, axis, u_axis, u_interval, v_interval, flipped: As for :class:`Cylinder`.
     """
 

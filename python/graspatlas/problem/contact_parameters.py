@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from graspatlas.patches.base import Array, Patch
-
-if TYPE_CHECKING:
-    from graspatlas.problem.contacts import Contact
+from graspatlas.patches.base import Patch
+from graspatlas.problem.contacts import Contact
+from graspatlas.support.arrays import Array, BoolArray
 
 __all__ = ["touching_parameters"]
 
@@ -32,17 +29,17 @@ def touching_parameters(contact: Contact, T_hand_object: Array, length_scale: fl
 
     Args:
         contact: The contact; its frozen parameters stay.
-        T_hand_object: Maps the object's frame to that of the hand's patch [4, 4].
+        T_hand_object: Maps the object's frame to that of the hand's patch (4, 4).
         length_scale: Gap that counts as much as normals that are one radian off [m].
 
     Returns:
         (u, v) of the hand's patch, and of the object's.
     """
-    sides = ((contact.hand, contact.hand_frozen), (contact.object, contact.frozen))
-    cores = [patch.core() for patch, _ in sides]
+    on_hand, on_object = sides = contact.sides
+    cores = [side.patch.core() for side in sides]
     R, t = T_hand_object[:3, :3], T_hand_object[:3, 3]
-    values = np.array([[frozen.get(name, 0.0) for name in ("u", "v")] for _, frozen in sides])
-    free = np.array([[n in patch.parameters and n not in frozen for n in ("u", "v")] for patch, frozen in sides])
+    values = np.array([[side.frozen.get(name, 0.0) for name in ("u", "v")] for side in sides])
+    free = np.array([[name in side.free for name in ("u", "v")] for side in sides])
     limits = np.transpose([patch.interval(name) or (-np.inf, np.inf) for patch, name in contact.free()])
 
     def filled(w: Array) -> Array:
@@ -61,9 +58,9 @@ def touching_parameters(contact: Contact, T_hand_object: Array, length_scale: fl
         return np.column_stack([c for c, moves in zip(columns, free.ravel(), strict=True) if moves])
 
     starts = []
-    for point in _starts(contact.hand, values[0], free[0], t):
+    for point in _starts(on_hand.patch, values[0], free[0], t):
         at = R.T @ (np.asarray(cores[0].evaluate(*point)["o"]) - t)
-        both = np.where(free, np.array([point, contact.object.locate(at)]), values)[free]
+        both = np.where(free, np.array([point, on_object.patch.locate(at)]), values)[free]
         starts.append(np.clip(both, *limits))
     starts.sort(key=lambda w: float(np.linalg.norm(residual(w))))
     best = starts[0]
@@ -77,8 +74,8 @@ def touching_parameters(contact: Contact, T_hand_object: Array, length_scale: fl
     return (float(u), float(v)), (float(body_u), float(body_v))
 
 
-def _starts(hand: Patch, values: Array, free: NDArray[np.bool_], object_origin: Array) -> list[Array]:
-    """Parameters of the hand's patch over its intervals [n, 2]; for endless ones the point nearest to the object."""
+def _starts(hand: Patch, values: Array, free: BoolArray, object_origin: Array) -> list[Array]:
+    """Parameters (u, v) of the hand's patch over its intervals; of endless ones those nearest to the object."""
     near = hand.locate(object_origin)
     choices: list[list[float]] = []
     for name, value, moves, nearest in zip(("u", "v"), values, free, near, strict=True):

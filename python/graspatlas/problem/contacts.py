@@ -7,12 +7,61 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from graspatlas import _core
 from graspatlas.errors import GraspAtlasError, unknown_name
-from graspatlas.patches import Patch, patch_from_dict
+from graspatlas.patches.base import Patch
+from graspatlas.patches.registry import patch_from_dict
+from graspatlas.support.arrays import Array
 from graspatlas.support.validation import checked_instance, checked_table, number
 
-__all__ = ["Contact"]
+__all__ = ["Contact", "ContactSide"]
+
+
+@dataclass(frozen=True)
+class ContactSide:
+    """One of the two patches of a contact, with the values of its parameters that do not move.
+
+    Attributes:
+        name: ``"hand"`` or ``"object"``.
+        patch: The patch.
+        frozen: Values by name of the parameters that do not move [rad or m].
+    """
+
+    name: str
+    patch: Patch
+    frozen: Mapping[str, float]
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the parameters that move, in the order in which they stand in x."""
+        return tuple(name for name in self.patch.parameters if name not in self.frozen)
+
+    def values_of_free(self, point: tuple[float, float]) -> list[float]:
+        """Values of the free parameters, from parameters (u, v) of the patch [rad or m]."""
+        return [point["uv".index(name)] for name in self.free]
+
+    def locate(self, point: ArrayLike) -> tuple[float, float]:
+        """Parameters (u, v) nearest to a point (3,) of the body's frame, but for those that are frozen."""
+        u, v = self.patch.locate(point)
+        return float(self.frozen.get("u", u)), float(self.frozen.get("v", v))
+
+    def core(self, joint: int, T_joint_body: Array) -> _core.ContactSide:
+        """The compiled side.
+
+        Args:
+            joint: Number of the joint that carries the body.
+            T_joint_body: Placement of the body's frame in this joint (4, 4).
+        """
+        parameters = []
+        for name in ("u", "v"):
+            free = name in self.free
+            interval = self.patch.interval(name) if free else None
+            low, high = interval or (-np.pi, np.pi)
+            value = float(self.frozen.get(name, 0.0))
+            parameters.append(_core.PatchParameter(free, value, free and interval is None, low, high))
+        return _core.ContactSide(joint, T_joint_body, self.patch.core(), *parameters)
 
 
 @dataclass(frozen=True)
@@ -35,12 +84,10 @@ class Contact:
 
     def __post_init__(self) -> None:
         checked_instance(self.frame, str, "a contact's frame")
-        for side, patch, frozen in (
-            ("object", self.object, self.frozen),
-            ("hand", self.hand, self.hand_frozen),
-        ):
-            checked_instance(patch, Patch, f"the {side}'s side of a contact", "graspatlas.patches")
-            for name, value in checked_table(frozen, "frozen", (), None).items():
+        for side in reversed(self.sides):
+            patch = side.patch
+            checked_instance(patch, Patch, f"the {side.name}'s side of a contact", "graspatlas.patches")
+            for name, value in checked_table(side.frozen, "frozen", (), None).items():
                 if name not in patch.parameters:
                     raise unknown_name("parameter", name, patch.parameters, f"one of a {patch.kind} patch's")
                 if not np.isfinite(number(value, f"frozen parameter '{name}'")):
@@ -49,10 +96,17 @@ class Contact:
     def __repr__(self) -> str:
         return f"<Contact of {self.frame!r}: {self.hand.kind} on {self.object.kind}>"
 
+    @property
+    def sides(self) -> tuple[ContactSide, ContactSide]:
+        """The hand's side and the object's, in the order in which their parameters stand in x."""
+        return (
+            ContactSide("hand", self.hand, self.hand_frozen),
+            ContactSide("object", self.object, self.frozen),
+        )
+
     def free(self) -> list[tuple[Patch, str]]:
         """Patches and names of the free parameters, in the order in which they stand in x."""
-        sides = ((self.hand, self.hand_frozen), (self.object, self.frozen))
-        return [(patch, name) for patch, frozen in sides for name in patch.parameters if name not in frozen]
+        return [(side.patch, name) for side in self.sides for name in side.free]
 
     def to_dict(self) -> dict[str, Any]:
         """The contact as plain data."""

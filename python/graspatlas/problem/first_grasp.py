@@ -7,18 +7,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.hand import Hand
-from graspatlas.patches import Patch
 from graspatlas.problem.contact_parameters import touching_parameters
 from graspatlas.problem.contacts import Contact
+from graspatlas.problem.object_joint import ObjectJoint, Quaternion
+from graspatlas.support.arrays import Array
 from graspatlas.support.validation import checked_table, number, number_array, numbers, shown
 
 __all__ = ["FirstGrasp", "first_grasp_from_array", "first_grasp_to_array", "posture_array", "unit_quaternion"]
-
-Array = NDArray[np.float64]
 
 #: Numbers of a first grasp are smaller [rad or m]: larger ones are mistakes, and their squares may overflow.
 LARGEST = 1e9
@@ -36,9 +35,9 @@ class FirstGrasp:
     """
 
     joints: Mapping[str, float]
-    object_xyz: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    object_quat_xyzw: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
-    parameters: tuple[float, ...] | None = None
+    object_xyz: Sequence[float] = (0.0, 0.0, 0.0)
+    object_quat_xyzw: Sequence[float] = (0.0, 0.0, 0.0, 1.0)
+    parameters: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
         checked_table(self.joints, "x1's joints", (), None)
@@ -74,13 +73,13 @@ class FirstGrasp:
         parameters = table.get("parameters")
         return cls(
             joints={name: number(value, f"joint '{name}' of x1") for name, value in joints.items()},
-            object_xyz=numbers(table["object_xyz"], "object_xyz"),  # type: ignore[arg-type]
-            object_quat_xyzw=numbers(table["object_quat_xyzw"], "object_quat_xyzw"),  # type: ignore[arg-type]
+            object_xyz=numbers(table["object_xyz"], "object_xyz"),
+            object_quat_xyzw=numbers(table["object_quat_xyzw"], "object_quat_xyzw"),
             parameters=None if parameters is None else numbers(parameters, "parameters"),
         )
 
 
-def unit_quaternion(quaternion: Sequence[float], what: str) -> tuple[float, float, float, float]:
+def unit_quaternion(quaternion: Sequence[float], what: str) -> Quaternion:
     """A quaternion (x, y, z, w) of length one.
 
     Args:
@@ -88,7 +87,7 @@ def unit_quaternion(quaternion: Sequence[float], what: str) -> tuple[float, floa
         what: What has it, for messages.
 
     Raises:
-        GraspAtlasError: If it is no four finite numbers, or zero.
+        GraspAtlasError: If it is not four finite numbers, or zero.
     """
     array = number_array(quaternion, f"the quaternion of {what}")
     if array.shape != (4,) or not (np.abs(array) < LARGEST).all():
@@ -103,7 +102,7 @@ def unit_quaternion(quaternion: Sequence[float], what: str) -> tuple[float, floa
 
 
 def posture_array(hand: Hand, joints: Mapping[str, float], what: str) -> Array:
-    """Joint configuration [nq] of joint positions by name [rad or m].
+    """Joint configuration (nq,) of joint positions by name [rad or m].
 
     Args:
         hand: The hand.
@@ -111,7 +110,7 @@ def posture_array(hand: Hand, joints: Mapping[str, float], what: str) -> Array:
         what: What gives them, for messages.
 
     Raises:
-        GraspAtlasError: If a joint is missing, or is none of the hand's.
+        GraspAtlasError: If a joint is missing, or the hand has no such joint.
     """
     for name in joints:
         if name not in hand.joints:
@@ -130,7 +129,7 @@ def posture_array(hand: Hand, joints: Mapping[str, float], what: str) -> Array:
 
 
 def first_grasp_to_array(
-    x1: FirstGrasp, hand: Hand, contacts: Sequence[Contact], object_joint: str, length_scale: float
+    x1: FirstGrasp, hand: Hand, contacts: Sequence[Contact], joint: ObjectJoint, length_scale: float
 ) -> Array:
     """x1 as the vector [q_hand, q_object, free patch parameters], in Pinocchio's conventions.
 
@@ -140,10 +139,7 @@ def first_grasp_to_array(
         GraspAtlasError: If joints or patch parameters are missing or too many.
     """
     q = posture_array(hand, x1.joints, "x1")
-    pose: list[float] = [*x1.object_xyz, *x1.object_quat_xyzw]
-    if object_joint == "planar":
-        _, _, z, w = x1.object_quat_xyzw
-        pose = [*x1.object_xyz[:2], w * w - z * z, 2.0 * w * z]
+    pose = joint.from_quaternion(x1.object_xyz, x1.object_quat_xyzw)
     free = sum(len(contact.free()) for contact in contacts)
     if x1.parameters is not None and len(x1.parameters) != free:
         how = "more" if len(x1.parameters) > free else "fewer"
@@ -160,28 +156,19 @@ def _nearest_parameters(
     """Free patch parameters at which hand and object touch, or nearly so."""
     places, T_object = hand.link_placements(q), _pose(x1)
     for contact in contacts:
-        T_frame = places[contact.frame]
-        if set(contact.hand_frozen) == set(contact.hand.parameters):
-            on_hand = _at(contact.hand, contact.hand_frozen, np.zeros(3))
-            touch = _apply(T_frame, contact.hand.point(*on_hand))
-            on_object = _at(contact.object, contact.frozen, _apply(_inverse(T_object), touch))
-        else:
+        T_frame, (of_hand, of_object) = places[contact.frame], contact.sides
+        if of_hand.free:
             on_hand, on_object = touching_parameters(contact, _inverse(T_frame) @ T_object, length_scale)
-        for patch, frozen, values in (
-            (contact.hand, contact.hand_frozen, on_hand),
-            (contact.object, contact.frozen, on_object),
-        ):
-            yield from (values["uv".index(name)] for name in patch.parameters if name not in frozen)
-
-
-def _at(patch: Patch, frozen: Mapping[str, float], point: Array) -> tuple[float, float]:
-    """(u, v) of a patch nearest to a point, but for what is frozen."""
-    u, v = patch.locate(point)
-    return (float(frozen.get("u", u)), float(frozen.get("v", v)))
+        else:
+            on_hand = of_hand.locate(np.zeros(3))
+            touch = _apply(T_frame, contact.hand.point(*on_hand))
+            on_object = of_object.locate(_apply(_inverse(T_object), touch))
+        yield from of_hand.values_of_free(on_hand)
+        yield from of_object.values_of_free(on_object)
 
 
 def _pose(x1: FirstGrasp) -> Array:
-    """T_palm_object [4, 4]."""
+    """T_palm_object (4, 4)."""
     T = np.eye(4)
     x, y, z, w = x1.object_quat_xyzw
     v = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
@@ -201,16 +188,9 @@ def _inverse(T: Array) -> Array:
     return inverse
 
 
-def first_grasp_from_array(x: Array, hand: Hand, object_joint: str) -> FirstGrasp:
+def first_grasp_from_array(x: Array, hand: Hand, joint: ObjectJoint) -> FirstGrasp:
     """The inverse of :func:`first_grasp_to_array`."""
     nq = hand.model.hand_q_size
-    xyz, quaternion, rest = [*x[nq : nq + 3]], [*x[nq + 3 : nq + 7]], x[nq + 7 :]
-    if object_joint == "planar":
-        half = 0.5 * np.arctan2(x[nq + 3], x[nq + 2])
-        xyz, quaternion, rest = [*x[nq : nq + 2], 0.0], [0.0, 0.0, np.sin(half), np.cos(half)], x[nq + 4 :]
-    return FirstGrasp(
-        joints=hand.joint_positions(x[:nq]),
-        object_xyz=tuple(map(float, xyz)),  # type: ignore[arg-type]
-        object_quat_xyzw=tuple(map(float, quaternion)),  # type: ignore[arg-type]
-        parameters=tuple(map(float, rest)),
-    )
+    pose, rest = x[nq : nq + joint.size], x[nq + joint.size :]
+    xyz, quaternion = joint.to_quaternion(pose)
+    return FirstGrasp(hand.joint_positions(x[:nq]), xyz, quaternion, tuple(map(float, rest)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,9 +16,6 @@ from graspatlas.support.validation import checked_table, number_array, numbers
 
 __all__ = ["PoseGuess"]
 
-#: How far out of the palm's x-y plane the guess of a planar problem may be [m, or quaternion's x and y].
-IN_PLANE = 1e-9
-
 
 @dataclass(frozen=True)
 class PoseGuess:
@@ -29,8 +26,8 @@ class PoseGuess:
         quat_xyzw: Its rotation; normalised. None where any rotation will do.
     """
 
-    xyz: tuple[float, float, float]
-    quat_xyzw: tuple[float, float, float, float] | None = None
+    xyz: Sequence[float]
+    quat_xyzw: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
         xyz = number_array(self.xyz, "xyz of the pose guess")
@@ -39,19 +36,11 @@ class PoseGuess:
         if self.quat_xyzw is not None:
             object.__setattr__(self, "quat_xyzw", unit_quaternion(self.quat_xyzw, "the pose guess"))
 
-    def check_in_plane(self) -> None:
-        """Raise GraspAtlasError unless the guess lies in the palm's x-y plane, and is turned about z only."""
-        x, y = self.quat_xyzw[:2] if self.quat_xyzw else (0.0, 0.0)
-        if max(abs(self.xyz[2]), abs(x), abs(y)) > IN_PLANE:
-            raise GraspAtlasError(
-                "the object moves in the x-y plane, so 'pose_guess' must lie there: z = 0, and turned about z only"
-            )
-
     def offset(self, xyz: ArrayLike, rotation: Rotation) -> tuple[float, float]:
         """How far a pose is from the guess: distance [m], and angle [rad], 0 where any rotation will do.
 
         Args:
-            xyz: Position [3], metres.
+            xyz: Position (3,), metres.
             rotation: Rotation.
         """
         distance = float(np.linalg.norm(np.asarray(xyz) - self.xyz))
@@ -74,6 +63,6 @@ class PoseGuess:
         table = checked_table(data, "the pose guess", ("xyz",), ("quat_xyzw",))
         quaternion = table.get("quat_xyzw")
         return cls(
-            xyz=numbers(table["xyz"], "xyz of the pose guess"),  # type: ignore[arg-type]
-            quat_xyzw=None if quaternion is None else numbers(quaternion, "quat_xyzw of the pose guess"),  # type: ignore[arg-type]
+            xyz=numbers(table["xyz"], "xyz of the pose guess"),
+            quat_xyzw=None if quaternion is None else numbers(quaternion, "quat_xyzw of the pose guess"),
         )

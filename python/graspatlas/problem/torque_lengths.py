@@ -8,20 +8,15 @@ object's origin is about one. No grasp plays a part in it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from graspatlas.patches import Patch
-
-if TYPE_CHECKING:
-    from graspatlas.problem.contacts import Contact
+from graspatlas.problem.contacts import Contact, ContactSide
+from graspatlas.problem.object_joint import FREE_FLYER, ObjectJoint
+from graspatlas.support.arrays import Array
 
 __all__ = ["largest_arm"]
-
-Array = NDArray[np.float64]
 
 #: Values of each free parameter at which a patch is looked at; odd, so that the middle is among them.
 GRID = 33
@@ -31,7 +26,7 @@ ZOOM_GRID = 5
 ZOOM = 0.25
 
 
-def largest_arm(contacts: Sequence[Contact], planar: bool = False) -> float:
+def largest_arm(contacts: Sequence[Contact], joint: ObjectJoint = FREE_FLYER) -> float:
     """Largest distance from the object's origin that a point of the object may have which a contact may touch [m].
 
     Frozen parameters keep their value, free ones go through their intervals. One without bounds stays at the point of
@@ -39,7 +34,7 @@ def largest_arm(contacts: Sequence[Contact], planar: bool = False) -> float:
 
     Args:
         contacts: The contacts.
-        planar: Whether the object stays in its x-y plane, so that distances are those in this plane.
+        joint: How the object moves: where it stays in its x-y plane distances are those in this plane.
 
     Returns:
         The length [m]; 0 when all contacts are at the origin.
@@ -47,17 +42,17 @@ def largest_arm(contacts: Sequence[Contact], planar: bool = False) -> float:
     Source: dividing torques by the largest arm follows M. A. Roa, R. Suárez, "Grasp Quality Measures: Review and
     Performance", Autonomous Robots 38 (2015), Section 2, there of the points of the object's surface.
     """
-    return max(_farthest(contact.object, contact.frozen, 2 if planar else 3) for contact in contacts)
+    return max(_farthest(contact.sides[1], joint.translations) for contact in contacts)
 
 
-def _farthest(patch: Patch, frozen: Mapping[str, float], axes: int) -> float:
-    """Largest distance of a patch's points from the origin, in the first two or in all three axes [m]."""
-    core = patch.core()
+def _farthest(side: ContactSide, axes: int) -> float:
+    """Largest distance of the points of a side's patch from the origin, in the first two or in all three axes [m]."""
+    core = side.patch.core()
 
     def distances(U: Array, V: Array) -> Array:
         return np.array([[np.linalg.norm(core.evaluate(u, v)["o"][:axes]) for v in V] for u in U])
 
-    spans = [_span(patch, name, frozen) for name in ("u", "v")]
+    spans = [_span(side, name) for name in ("u", "v")]
     values = [np.linspace(low, high, GRID) if low < high else np.array([low]) for low, high in spans]
     steps = [(high - low) / (GRID - 1) for low, high in spans]
     best = 0.0
@@ -74,17 +69,15 @@ def _farthest(patch: Patch, frozen: Mapping[str, float], axes: int) -> float:
     return best
 
 
-def _span(patch: Patch, parameter: str, frozen: Mapping[str, float]) -> tuple[float, float]:
+def _span(side: ContactSide, parameter: str) -> tuple[float, float]:
     """Smallest and largest value of a parameter; the same when it does not move or has no bounds."""
-    if parameter in frozen:
-        return (float(frozen[parameter]),) * 2
-    if parameter not in patch.parameters:
-        return 0.0, 0.0
-    interval = patch.interval(parameter)
+    if parameter not in side.free:
+        return (float(side.frozen.get(parameter, 0.0)),) * 2
+    interval = side.patch.interval(parameter)
     if interval is None:
         return -np.pi, np.pi
     low, high = interval
     if np.isfinite([low, high]).all():
         return low, high
-    nearest = patch.locate(np.zeros(3))[("u", "v").index(parameter)]
+    nearest = side.patch.locate(np.zeros(3))[("u", "v").index(parameter)]
     return (float(np.clip(nearest, low, high)),) * 2

@@ -87,7 +87,7 @@ def parse(text: str) -> Document:
     """Read a YAML text; JSON is YAML too. No tag is followed and no code is run.
 
     Raises:
-        DocumentError: If it is no YAML, a key stands twice, or it holds anything but plain data.
+        DocumentError: If it is not YAML, a key stands twice, or it holds anything but plain data.
     """
     try:
         node = yaml.compose(text, _Loader)
@@ -168,5 +168,5 @@ def _text(value: str, line: int) -> str:
     try:
         value.encode("utf-8")
     except UnicodeEncodeError:
-        raise DocumentError(line, f"{value!r:.60} holds an escape that is no letter; correct it") from None
+        raise DocumentError(line, f"{value!r:.60} holds an escape that is not a character; correct it") from None
     return value

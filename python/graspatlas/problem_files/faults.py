@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.problem_files.documents import Document, Path
@@ -71,7 +72,7 @@ def faults_of_validation(file: str, document: Document, error: ValidationError) 
     return [one_line(file, document, path, message) for path, message in ordered]
 
 
-def _path(data: Any, location: tuple[int | str, ...], *, missing: bool) -> Path:
+def _path(data: object, location: tuple[int | str, ...], *, missing: bool) -> Path:
     """The place in the file that a location of pydantic means, which also names the types that it tried."""
     path: list[int | str] = []
     for i, key in enumerate(location):
@@ -85,7 +86,7 @@ def _path(data: Any, location: tuple[int | str, ...], *, missing: bool) -> Path:
     return tuple(path)
 
 
-def _message(item: Any) -> str:
+def _message(item: ErrorDetails) -> str:
     kind, value, context = item["type"], item["input"], item.get("ctx", {})
     if kind == "missing":
         return "is missing"
@@ -119,7 +120,7 @@ def _length(kind: str, context: Mapping[str, Any]) -> str:
     return f"must hold {least}{wanted} item{'s' if wanted != 1 else ''}, got {context['actual_length']}"
 
 
-def shown(value: Any) -> str:
+def shown(value: object) -> str:
     """A value as a message quotes it."""
     text = "nothing" if value is None else repr(value)
     return text if len(text) <= MOST_SHOWN else text[: MOST_SHOWN - 3] + "..."
@@ -150,7 +151,7 @@ def narrowed(document: Document, path: Path, message: str) -> tuple[Path, str]:
     return path or _subject(document.data, message, first_word=False), message
 
 
-def _subject(data: Any, message: str, *, first_word: bool) -> Path:
+def _subject(data: Mapping[str, object], message: str, *, first_word: bool) -> Path:
     """The field of the whole problem that a message begins with, or else mentions first."""
     text = message.removeprefix("the ").replace("hand motions", "hand_motions").replace("contact ", "contacts ")
     words = re.findall(r"\w+", text)[: 1 if first_word else None]
@@ -164,7 +165,7 @@ def _value(data: Any, path: Path) -> Any:
     return data
 
 
-def _fields(data: Any, path: Path) -> Iterator[tuple[Path, str | int, Any]]:
+def _fields(data: object, path: Path) -> Iterator[tuple[Path, str | int, object]]:
     """All fields below one, in the order of the file."""
     items = data.items() if isinstance(data, Mapping) else enumerate(data) if isinstance(data, list) else ()
     for key, value in items:

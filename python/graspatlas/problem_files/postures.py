@@ -7,25 +7,25 @@ import io
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.support.archives import DamagedArchive, read_arrays
+from graspatlas.support.arrays import Array
 from graspatlas.support.files import opened, read_text
 
 __all__ = ["read_postures"]
 
 
-def read_postures(path: Path, name: str | None = None) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+def read_postures(path: Path, name: str | None = None) -> tuple[Array, tuple[str, ...]]:
     """Postures of a hand, and the joints that their columns are of.
 
     Args:
-        path: A CSV file whose first row names the joints, or an NPZ file with ``samples`` [z, h] and ``joints`` [h];
+        path: A CSV file whose first row names the joints, or an NPZ file with ``samples`` (z, h) and ``joints`` (h,);
             radians, and metres for joints that slide.
         name: The file's name for messages.
 
     Returns:
-        The postures, one a row [z, h], and the names of the joints [h].
+        The postures, one a row (z, h), and the names of the joints (h,).
 
     Raises:
         GraspAtlasError: If the file cannot be read or holds anything else.
@@ -38,7 +38,7 @@ def read_postures(path: Path, name: str | None = None) -> tuple[NDArray[np.float
         raise GraspAtlasError(f"cannot read postures '{label}': {reason}") from None
 
 
-def _read_csv(path: Path, label: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+def _read_csv(path: Path, label: str) -> tuple[Array, tuple[str, ...]]:
     with io.StringIO(read_text(path, "utf-8-sig"), newline="") as file:
         reader = csv.reader(file)
         names = tuple(name.strip() for name in next(reader, []))
@@ -64,7 +64,7 @@ def _number(text: str, label: str, line: int, joint: str) -> float:
     return value
 
 
-def _read_npz(path: Path, label: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+def _read_npz(path: Path, label: str) -> tuple[Array, tuple[str, ...]]:
     try:
         with opened(path, "postures") as stream:
             arrays = read_arrays(stream)

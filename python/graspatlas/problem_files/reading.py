@@ -12,19 +12,22 @@ import numpy as np
 from pydantic import ValidationError
 
 from graspatlas.errors import GraspAtlasError, unknown_name
-from graspatlas.hand.hand import Body, Hand
+from graspatlas.hand.body import Body
+from graspatlas.hand.hand import Hand
 from graspatlas.hand.motions import HandMotions, coupling_rows
 from graspatlas.hand.robot_files import described_robot, example_robot, find_file
-from graspatlas.hand.urdf import box_urdf, cylinder_urdf, mesh_urdf, moving_joints, sphere_urdf
-from graspatlas.patches import patch_from_dict
+from graspatlas.hand.urdf import mesh_urdf, moving_joints
+from graspatlas.patches.registry import patch_from_dict
 from graspatlas.problem.contacts import Contact
+from graspatlas.problem.first_grasp import FirstGrasp
 from graspatlas.problem.pose_guess import PoseGuess
 from graspatlas.problem.problem import Problem
+from graspatlas.problem.requirement import StatedRequirement, requirement_from_dict
 from graspatlas.problem_files import documents
 from graspatlas.problem_files.faults import ProblemFileError, faults_of_validation, narrowed, one_line
 from graspatlas.problem_files.postures import read_postures
-from graspatlas.problem_files.schema import HandTable, MotionsTable, ObjectTable, ProblemTable
-from graspatlas.requirements.screening import requirement_from_dict
+from graspatlas.problem_files.schema import ContactTable, HandTable, MotionsTable, ObjectTable, ProblemTable
+from graspatlas.problem_files.schema_tables import Table
 
 __all__ = ["FILL_IN", "read_problem"]
 
@@ -90,47 +93,65 @@ class _Reading:
 
     def problem(self, table: ProblemTable) -> Problem:
         """The problem itself."""
-        stated = self.document.data
-        with self._within("hand"):
-            full = self._whole_hand(table.hand)
-            hand = full.with_joints(table.hand.joints, table.hand.locked)
-            if table.hand.enlarge_limits:
-                hand = hand.with_limits_enlarged(table.hand.enlarge_limits)
-            _ = hand.mechanism
+        full, hand = self._hand(table.hand)
         with self._within("object"):
             body = self._object(table.object)
-        for i, contact in enumerate(stated["contacts"]):
-            for side in ("hand", "object"):
-                with self._within("contacts", i, side):
-                    patch_from_dict(contact[side])
-            with self._within("contacts", i):
-                hand.frame(Contact.from_dict(contact).frame)
-        plain: dict[str, Any] = {
-            "name": table.name or Path(self.file).stem,
-            "description": table.description,
-            "source": table.source,
-            "hand": hand.to_dict(),
-            "object": {**body.to_dict(), "joint": table.object.joint},
-            "contacts": stated["contacts"],
-            "length_scale": table.length_scale,
-            "defaults": table.defaults.model_dump(exclude_none=True),
-        }
+        contacts = tuple(self._contact(i, contact, hand) for i, contact in enumerate(table.contacts))
+        guess = motions = x1 = None
         if table.object.pose_guess is not None:
             with self._within("object", "pose_guess"):
                 guess = PoseGuess.from_dict(table.object.pose_guess.model_dump(exclude_none=True))
-                plain["object"]["pose_guess"] = guess.to_dict()
         if table.hand_motions is not None:
             with self._within("hand_motions"):
                 motions = self._motions(table.hand_motions, hand, moving_joints(full.urdf))
-                plain["hand_motions"] = motions.to_dict()
-        for i, requirement in enumerate(table.requirements):
-            with self._within("requirements", i):
-                stated_requirement = requirement.model_dump(exclude_none=True)
-                requirement_from_dict(stated_requirement)
-                plain.setdefault("requirements", []).append(stated_requirement)
-        plain |= {name: stated[name] for name in ("x1", "reference", "torque_length") if stated.get(name) is not None}
+        requirements = tuple(self._requirement(i, requirement) for i, requirement in enumerate(table.requirements))
+        stated = self.document.data
+        if stated.get("x1") is not None:
+            with self._within("x1"):
+                x1 = FirstGrasp.from_dict(stated["x1"])
         with self._within():
-            return Problem.from_dict(plain, self.folder)
+            return Problem(
+                name=table.name or Path(self.file).stem,
+                hand=hand,
+                object=body,
+                contacts=contacts,
+                x1=x1,
+                motions=motions,
+                reference=stated.get("reference"),
+                object_joint=table.object.joint,
+                length_scale=table.length_scale,
+                defaults=table.defaults.model_dump(exclude_none=True),
+                requirements=requirements,
+                description=table.description,
+                source=table.source,
+                pose_guess=guess,
+                torque_length=stated.get("torque_length"),
+            )
+
+    def _hand(self, table: HandTable) -> tuple[Hand, Hand]:
+        """The hand as its URDF has it, and the one with only those joints that move."""
+        with self._within("hand"):
+            full = self._whole_hand(table)
+            hand = full.with_joints(table.joints, table.locked)
+            if table.enlarge_limits:
+                hand = hand.with_limits_enlarged(table.enlarge_limits)
+            _ = hand.mechanism
+            return full, hand
+
+    def _contact(self, i: int, table: ContactTable, hand: Hand) -> Contact:
+        stated = self.document.data["contacts"][i]
+        with self._within("contacts", i, "hand"):
+            on_hand = patch_from_dict(stated["hand"])
+        with self._within("contacts", i, "object"):
+            on_object = patch_from_dict(stated["object"])
+        with self._within("contacts", i):
+            contact = Contact(table.frame, on_hand, on_object, table.frozen, table.hand_frozen)
+            hand.frame(contact.frame)
+            return contact
+
+    def _requirement(self, i: int, table: Table) -> StatedRequirement:
+        with self._within("requirements", i):
+            return requirement_from_dict(table.model_dump(exclude_none=True))
 
     def _whole_hand(self, table: HandTable) -> Hand:
         """The hand as its URDF has it, with the limits that are stated."""
@@ -149,12 +170,11 @@ class _Reading:
     def _object(self, table: ObjectTable) -> Body:
         name = table.name
         if table.sphere is not None:
-            return Body(name or "sphere", sphere_urdf(name or "sphere", table.sphere.radius))
+            return Body.sphere(name or "sphere", table.sphere.radius)
         if table.box is not None:
-            return Body(name or "box", box_urdf(name or "box", table.box.size))
+            return Body.box(name or "box", table.box.size)
         if table.cylinder is not None:
-            urdf = cylinder_urdf(name or "cylinder", table.cylinder.radius, table.cylinder.length)
-            return Body(name or "cylinder", urdf)
+            return Body.cylinder(name or "cylinder", table.cylinder.radius, table.cylinder.length)
         if table.mesh is not None:
             return self._mesh(table.mesh, table)
         plain = table.model_dump(

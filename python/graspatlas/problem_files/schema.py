@@ -6,10 +6,14 @@ from typing import Annotated, Any, Literal, Union, get_type_hints
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
 
-from graspatlas.patches import Patch, patch_types
+import graspatlas.requirements.collision_free
+import graspatlas.requirements.force_closure
+import graspatlas.requirements.joint_margin  # noqa: F401
+from graspatlas.patches.base import Patch
+from graspatlas.patches.registry import patch_types
+from graspatlas.problem.requirement import REQUIREMENTS
 from graspatlas.problem_files.schema_tables import Finite, Table, exactly_one, known_name, table_of
 from graspatlas.quality.evaluation import INDICES
-from graspatlas.requirements.screening import REQUIREMENTS
 
 __all__ = ["ProblemTable", "json_schema"]
 
@@ -198,6 +202,7 @@ def _requirement_table() -> Any:
 
 
 PatchTable: Any = _patch_table()
+RequirementTable: Any = _requirement_table()
 
 
 class ContactTable(Table):
@@ -241,9 +246,9 @@ class ProblemTable(Table):
     torque_length: Positive | None = None
     """Length that divides torques in indices such as ferrari_canny_epsilon [m]; the largest arm of a contact by "
     "default."""
-    defaults: DefaultsTable = Field(default_factory=DefaultsTable)  # type: ignore[arg-type]
+    defaults: DefaultsTable = Field(default_factory=lambda: DefaultsTable.model_validate({}))
     """Options to use when the caller names none."""
-    requirements: list[_requirement_table()] = Field(default_factory=list)  # type: ignore[valid-type]
+    requirements: list[RequirementTable] = Field(default_factory=list)
     """What the best grasp must meet when the caller does not say."""
 
 

@@ -65,10 +65,11 @@ def list_like(annotation: Any, patch: Any = None) -> Any:
     """
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is tuple and len(arguments) == 2 and arguments[1] is ...:
-        return list[list_like(arguments[0], patch)]  # type: ignore[misc]
+        return types.GenericAlias(list, list_like(arguments[0], patch))
     if origin is tuple:
         n = len(arguments)
-        return Annotated[list[list_like(arguments[0], patch)], Field(min_length=n, max_length=n)]  # type: ignore[misc]
+        items = types.GenericAlias(list, list_like(arguments[0], patch))
+        return Annotated[items, Field(min_length=n, max_length=n)]
     if origin in (Union, types.UnionType):
         return Union[tuple(list_like(one, patch) for one in arguments)]  # noqa: UP007
     if annotation in (float, int, str, bool, type(None)) or origin is Literal:

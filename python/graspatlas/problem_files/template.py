@@ -11,7 +11,7 @@ import numpy as np
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.hand import Hand
 from graspatlas.hand.robot_files import described_robot, example_robot, find_file
-from graspatlas.patches import patch_types
+from graspatlas.patches.registry import patch_types
 from graspatlas.problem_files.reading import FILL_IN
 from graspatlas.support.files import is_file
 
@@ -95,7 +95,7 @@ def problem_template(urdf: str, object_file: str | None = None, *, folder: Path 
         GraspAtlasError: If the hand cannot be read.
     """
     hand, source = _hand(urdf, folder)
-    joints = list(hand.mechanism.driven)
+    joints = list(hand.mechanism.actuated)
     head = _HEAD.format(
         blank=FILL_IN,
         name=f"my_{hand.name}",

@@ -13,29 +13,17 @@ wrench space of Ferrari and Canny. These functions know points and normals only,
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
-from graspatlas.support.validation import number, number_array, whole
+from graspatlas.support.arrays import Array
+from graspatlas.support.validation import number, number_array, positive, whole
 
 __all__ = ["ball_radius", "contact_axes", "contact_wrenches", "hull_volume", "min_weight", "round_ball_radius"]
 
-Array = NDArray[np.float64]
-
 #: Fewest edges that make a pyramid.
 MIN_EDGES = 3
-
-
-def checked_positive(value: float, what: str) -> float:
-    """A positive, finite number.
-
-    Raises:
-        GraspAtlasError: If it is none.
-    """
-    if not 0.0 < number(value, what) < np.inf:
-        raise GraspAtlasError(f"{what} must be a positive number, got {value!r}")
-    return float(value)
 
 
 def contact_axes(points: ArrayLike, normals: ArrayLike, length_unit: float, planar: bool = False) -> Array:
@@ -45,13 +33,13 @@ def contact_axes(points: ArrayLike, normals: ArrayLike, length_unit: float, plan
     normal is within 45 degrees of that axis; then from the x axis.
 
     Args:
-        points: Contact points, seen from the point that torques are about [n, m, 3], metres.
-        normals: Outward unit normals of the object there [n, m, 3].
+        points: Contact points, seen from the point that torques are about (n, m, 3), metres.
+        normals: Outward unit normals of the object there (n, m, 3).
         length_unit: The length that divides torques [m].
         planar: Whether forces stay in the x-y plane and the torque is about z.
 
     Returns:
-        Wrenches [n, m, 3, 6], or [n, m, 2, 3] in the plane.
+        Wrenches (n, m, 3, 6), or (n, m, 2, 3) in the plane.
 
     Raises:
         GraspAtlasError: If the arrays have other shapes, or the length is not positive.
@@ -61,7 +49,7 @@ def contact_axes(points: ArrayLike, normals: ArrayLike, length_unit: float, plan
         raise GraspAtlasError(
             f"points and normals must have the shape [grasps, contacts, 3]; got {p.shape} and {outward.shape}"
         )
-    scale = checked_positive(length_unit, "length_unit")
+    scale = positive(length_unit, "length_unit")
     n = -outward
     if planar:
         t = np.stack([-n[..., 1], n[..., 0], np.zeros_like(n[..., 0])], axis=-1)
@@ -90,8 +78,8 @@ def contact_wrenches(
     pyramid's edges and of the normal force with the largest torque either way.
 
     Args:
-        points: Contact points, seen from the point that torques are about [n, m, 3], metres.
-        normals: Outward unit normals of the object there [n, m, 3].
+        points: Contact points, seen from the point that torques are about (n, m, 3), metres.
+        normals: Outward unit normals of the object there (n, m, 3).
         friction: Coefficient of friction mu.
         edges: Edges of each pyramid, three or more; the first lies along the tangent that :func:`contact_axes` states.
             In the plane a cone has two edges, whatever this says.
@@ -101,12 +89,12 @@ def contact_wrenches(
             fingers. It plays no part in the plane.
 
     Returns:
-        Wrenches [n, m edges, 6], two more for each contact of soft fingers; or [n, 2 m, 3] in the plane.
+        Wrenches (n, m edges, 6), two more for each contact of soft fingers; or (n, 2 m, 3) in the plane.
 
     Raises:
         GraspAtlasError: If an argument is out of its range or of another shape.
     """
-    mu = checked_positive(friction, "friction")
+    mu = positive(friction, "friction")
     whole(edges, "edges", MIN_EDGES)
     axes = contact_axes(points, normals, length_unit, planar)
     if planar:
@@ -127,15 +115,15 @@ def contact_wrenches(
 
 
 def ball_radius(wrenches: ArrayLike) -> Array:
-    """Radius of the largest ball around the origin in the convex hull of the wrenches of each grasp [n].
+    """Radius of the largest ball around the origin in the convex hull of the wrenches of each grasp (n,).
 
     It is 0 where the origin is not inside the hull. The hull is only refined where it is nearest to the origin.
 
     Args:
-        wrenches: Wrenches [n, w, 3 or 6].
+        wrenches: Wrenches (n, w, 3) or (n, w, 6).
 
     Raises:
-        GraspAtlasError: If the array has another shape, or holds what is no finite number.
+        GraspAtlasError: If the array has another shape, or holds what is not a finite number.
 
     Source: Y. Zheng, "An Efficient Algorithm for a Grasp Quality Measure", IEEE T-RO 29 (2013).
     """
@@ -143,10 +131,10 @@ def ball_radius(wrenches: ArrayLike) -> Array:
 
 
 def round_ball_radius(axes: ArrayLike, friction: float) -> Array:
-    """The same for round friction cones, from below and to one part in ten thousand [n].
+    """The same for round friction cones, from below and to one part in ten thousand (n,).
 
     Args:
-        axes: Wrenches of the contacts' normals and tangents [n, m, 3, 6], from :func:`contact_axes`.
+        axes: Wrenches of the contacts' normals and tangents (n, m, 3, 6), from :func:`contact_axes`.
         friction: Coefficient of friction mu.
 
     Raises:
@@ -156,34 +144,34 @@ def round_ball_radius(axes: ArrayLike, friction: float) -> Array:
     if array.ndim != 4 or array.shape[2:] != (3, 6):
         raise GraspAtlasError(f"axes must have the shape [grasps, contacts, 3, 6], got {array.shape}")
     return np.asarray(
-        _core.round_ball_radii(array.reshape(len(array), 3 * array.shape[1], 6), checked_positive(friction, "friction"))
+        _core.round_ball_radii(array.reshape(len(array), 3 * array.shape[1], 6), positive(friction, "friction"))
     )
 
 
 def hull_volume(wrenches: ArrayLike) -> Array:
-    """Volume of the convex hull of the wrenches of each grasp [n]; 0 where they lie in one plane.
+    """Volume of the convex hull of the wrenches of each grasp (n,); 0 where they lie in one plane.
 
     Args:
-        wrenches: Wrenches [n, w, 3 or 6].
+        wrenches: Wrenches (n, w, 3) or (n, w, 6).
 
     Raises:
-        GraspAtlasError: If the array has another shape, or holds what is no finite number.
+        GraspAtlasError: If the array has another shape, or holds what is not a finite number.
     """
     return np.asarray(_core.hull_volumes(number_array(wrenches, "wrenches")))
 
 
 def min_weight(wrenches: ArrayLike) -> Array:
-    r"""Least weight with which all wrenches of a grasp can take part in cancelling each other, times their number [n].
+    r"""Least weight with which all wrenches of a grasp can take part in cancelling each other, times their number (n,).
 
     It is 0 where the origin is not inside their hull, and 1 where they cancel with equal weights.
 
     .. math:: w \max \{ l \;:\; \sum_j \alpha_j w_j = 0, \; \sum_j \alpha_j = 1, \; \alpha_j \ge l \}
 
     Args:
-        wrenches: Wrenches [n, w, 3 or 6].
+        wrenches: Wrenches (n, w, 3) or (n, w, 6).
 
     Raises:
-        GraspAtlasError: If the array has another shape, or holds what is no finite number.
+        GraspAtlasError: If the array has another shape, or holds what is not a finite number.
 
     Source: A. H. Li, P. Culbertson, J. W. Burdick, A. D. Ames, "FRoGGeR", IROS 2023.
     """

@@ -14,7 +14,9 @@ from graspatlas.reproduce.published import RELEASED_RATIO
 from graspatlas.reproduce.report import Claim, Number, Section
 from graspatlas.reproduce.runs import Setting
 from graspatlas.requirements.collision import CollisionChecker
-from graspatlas.requirements.screening import CollisionFree, ForceClosure, screen
+from graspatlas.requirements.collision_free import CollisionFree
+from graspatlas.requirements.force_closure import ForceClosure
+from graspatlas.requirements.screening import screen
 from graspatlas.result.result import Result
 
 __all__ = [

@@ -56,7 +56,7 @@ def run(setting: Setting) -> Result:
     )
     if result.status is Status.INTERRUPTED:
         raise KeyboardInterrupt
-    return with_index(result, setting.quality) if result.problem.object_joint == "planar" else result
+    return with_index(result, setting.quality) if result.problem.object_joint_model.planar else result
 
 
 def numbers_of(result: Result, setting: Setting, label: str = "") -> list[Number]:
@@ -75,7 +75,7 @@ def numbers_of(result: Result, setting: Setting, label: str = "") -> list[Number
 def _sizes(result: Result, setting: Setting, paper: Published) -> Iterator[tuple[Any, ...]]:
     problem, k = result.problem, setting.dimension
     full = problem.full_system
-    planar = problem.object_joint == "planar"
+    planar = problem.object_joint_model.planar
     yield "variables of F", paper.variables, full.tangent_size, "", WHY["variables"]
     yield "equations of F", paper.equations, full.n_equations, "", WHY["equations"]
     yield "dimension t of feasible grasps", paper.full_dimension, problem.full_dimension
@@ -104,7 +104,7 @@ def _qualities(result: Result, setting: Setting) -> Iterator[tuple[Any, ...]]:
     scaled = with_index(result, setting.quality)
     index = setting.quality.replace("_", " ")
     n_singular = int((scaled.qualities < SINGULAR_BELOW[setting.quality]).sum())
-    unit = f"{1e3 * result.problem.length_scale:g} mm" if result.problem.object_joint == "planar" else "mm"
+    unit = f"{1e3 * result.problem.length_scale:g} mm" if result.problem.object_joint_model.planar else "mm"
     yield f"best {index}, lengths in {unit}", None, result.best.quality
     yield f"worst {index}, lengths in {unit}", None, result.worst.quality
     yield "index at the first grasp", None, float(result.qualities[0])

@@ -1,18 +1,14 @@
 """What an accepted grasp must meet: force closure, no collision, distance from joint limits."""
 
-from graspatlas.requirements.screening import (
-    REQUIREMENTS,
-    CollisionFree,
-    ForceClosure,
-    JointMargin,
-    Require,
-    Requirement,
-    check_requirements,
-    parse_requirement,
-    requirement_from_dict,
-    requirement_name,
-    screen,
-)
+from graspatlas.problem.requirement import REQUIREMENTS, parse_requirement, requirement_from_dict
+from graspatlas.requirements.base import Requirement, RequirementLike, requirement_name
+from graspatlas.requirements.collision_free import CollisionFree
+from graspatlas.requirements.force_closure import ForceClosure
+from graspatlas.requirements.joint_margin import JointMargin
+from graspatlas.requirements.screening import check_requirements, screen
+
+#: The earlier name of RequirementLike.
+Require = RequirementLike
 
 __all__ = [
     "REQUIREMENTS",
@@ -21,6 +17,7 @@ __all__ = [
     "JointMargin",
     "Require",
     "Requirement",
+    "RequirementLike",
     "check_requirements",
     "parse_requirement",
     "requirement_from_dict",

@@ -14,15 +14,14 @@ from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.mesh_files import check_meshes
 from graspatlas.requirements.collision_shapes import Shape, convex_hull, convex_solid, read_shapes, thinner
+from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.support.progress import progress_bar
 
 if TYPE_CHECKING:
-    from graspatlas.hand.hand import Body
+    from graspatlas.hand.body import Body
     from graspatlas.problem.problem import Problem
 
 __all__ = ["CollisionChecker", "Nearest"]
-
-Array = NDArray[np.float64]
 
 #: Before the names of the object's shapes.
 OBJECT = "object/"
@@ -38,12 +37,12 @@ class Nearest:
     normal . (db - da), where the points are unique. Where two meshes cut each other points and normals are NaN.
 
     Attributes:
-        pairs: Names of the shapes [p].
-        distances: Signed distances [n, p], metres: negative is the depth of a collision; meshes that are no solids have
+        pairs: Names of the shapes (p,).
+        distances: Signed distances (n, p), metres: negative is the depth of a collision; meshes that are no solids have
             none.
-        on_first: The point on the first shape, in the palm's frame [n, p, 3], metres.
-        on_second: The point on the second shape [n, p, 3], metres.
-        normals: Unit vectors along which the second shape gets away from the first [n, p, 3], in the palm's frame.
+        on_first: The point on the first shape, in the palm's frame (n, p, 3), metres.
+        on_second: The point on the second shape (n, p, 3), metres.
+        normals: Unit vectors along which the second shape gets away from the first (n, p, 3), in the palm's frame.
     """
 
     pairs: tuple[tuple[str, str], ...]
@@ -70,8 +69,8 @@ class CollisionChecker:
         clearance: Distance that all other pairs must keep [m].
 
     Attributes:
-        pairs: Names of the shapes of each pair that is looked at [p].
-        required: Distance that each pair must keep, less what it may sink in [p], metres.
+        pairs: Names of the shapes of each pair that is looked at (p,).
+        required: Distance that each pair must keep, less what it may sink in (p,), metres.
         thinned: How far the hulls that were thinned reach beyond what is left of them, by the shapes' names [m].
 
     Raises:
@@ -80,7 +79,7 @@ class CollisionChecker:
 
     def __init__(self, problem: Problem, touch_depth: float = 0.002, clearance: float = 0.0) -> None:
         self._hand = problem.hand
-        model = _core.Model(problem.hand.tree, problem.object_joint)
+        model = problem.object_joint_model.model(problem.hand.tree)
         shapes, pairs = _joined(problem, model.object_joint, touch_depth, clearance)
         self._shapes = tuple(shapes)
         self._size = model.q_size
@@ -94,16 +93,16 @@ class CollisionChecker:
         """Names of the first two shapes found in collision at a grasp, or None.
 
         Args:
-            x: The grasp [configuration_size].
+            x: The grasp (configuration_size,).
         """
         (hit,) = self._core.first_hits(self._rows(np.asarray(x, float)[None]))
         return None if hit < 0 else self.pairs[hit]
 
-    def free(self, X: ArrayLike) -> NDArray[np.bool_]:
-        """Whether each grasp is free of collision [n].
+    def free(self, X: ArrayLike) -> BoolArray:
+        """Whether each grasp is free of collision (n,).
 
         Args:
-            X: One grasp a row [n, configuration_size].
+            X: One grasp a row (n, configuration_size).
         """
         rows = self._rows(X)
         out = np.empty(len(rows), bool)
@@ -115,11 +114,11 @@ class CollisionChecker:
         return out
 
     def clearances(self, X: ArrayLike, pairs: ArrayLike | None = None) -> Array:
-        """Distance of each pair of shapes, less the distance that it must keep; negative in collision [n, p], metres.
+        """Distance of each pair of shapes, less the distance that it must keep; negative in collision (n, p), metres.
 
         Args:
-            X: One grasp a row [n, configuration_size].
-            pairs: Numbers of the pairs [p], in the order of the attribute `pairs`; all by default.
+            X: One grasp a row (n, configuration_size).
+            pairs: Numbers of the pairs (p,), in the order of the attribute `pairs`; all by default.
         """
         chosen = self._chosen(pairs)
         return np.asarray(self._core.nearest(self._rows(X), chosen)["distances"] - self.required[chosen])
@@ -130,8 +129,8 @@ class CollisionChecker:
         Distances of shapes that are apart are exact to 1e-10 m, depths to 1e-6 m.
 
         Args:
-            X: One grasp a row [n, configuration_size].
-            pairs: Numbers of the pairs [p], in the order of the attribute `pairs`; all by default.
+            X: One grasp a row (n, configuration_size).
+            pairs: Numbers of the pairs (p,), in the order of the attribute `pairs`; all by default.
         """
         chosen = self._chosen(pairs)
         found = self._core.nearest(self._rows(X), chosen)
@@ -141,12 +140,12 @@ class CollisionChecker:
         """How far points are from the collision shapes of a link or of the object, at a grasp.
 
         Args:
-            x: The grasp [configuration_size].
+            x: The grasp (configuration_size,).
             frame: Link of the hand, of which the shapes of its joint count; the object where there is none.
-            points: The points in the palm's frame [n, 3], metres.
+            points: The points in the palm's frame (n, 3), metres.
 
         Returns:
-            Distance of each point from the nearest shape [n], metres: negative inside, but for meshes that are not
+            Distance of each point from the nearest shape (n,), metres: negative inside, but for meshes that are not
             convex, and infinite where there is no shape.
         """
         joint = None if frame is None else self._hand.frame(frame)[0]

@@ -19,10 +19,9 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from graspatlas import _core
 from graspatlas.requirements.hulls import MANY_POINTS, corners_of_hull, mesh_volume, shallow_volume
+from graspatlas.support.arrays import Array
 
 __all__ = ["Shape", "convex_hull", "convex_solid", "read_shapes", "thinner"]
-
-Array = NDArray[np.float64]
 
 #: A mesh is convex when it has the volume of its hull but for this share.
 CONVEX = 1e-3
@@ -36,13 +35,13 @@ class Shape:
         kind: ``"sphere"``, ``"capsule"``, ``"cylinder"`` or ``"box"`` about the origin, with its axis along z;
             ``"convex"`` or ``"mesh"``.
         sizes: Radius; radius and distance of the ends' centres; radius and length; edges [m].
-        points: Corners of a convex solid or mesh [n, 3], metres.
-        triangles: Corners of each triangle of a mesh [t, 3].
+        points: Corners of a convex solid or mesh (n, 3), metres.
+        triangles: Corners of each triangle of a mesh (t, 3).
         name: Its name, that of its link with a number.
         link: The link that it belongs to.
         joint: Joint that carries it; 0 is the palm.
         parent_joint: The joint before that.
-        placement: Of the shape in the joint [4, 4].
+        placement: Of the shape in the joint (4, 4).
         error: How far a hull reaches beyond what is left of it after thinning [m].
     """
 
@@ -82,7 +81,7 @@ def read_shapes(tree: str, urdf: str, package_dirs: Sequence[str]) -> list[Shape
 
 
 def convex_solid(shape: Shape) -> Shape:
-    """The convex solid that a mesh bounds; the shape itself when it is no mesh, or is not convex or not closed."""
+    """The convex solid that a mesh bounds; the shape itself when it is not a mesh, or is not convex or not closed."""
     if shape.kind == "convex":
         return _hull_of(shape) or shape
     if not shape.is_mesh:
@@ -92,7 +91,7 @@ def convex_solid(shape: Shape) -> Shape:
 
 
 def convex_hull(shape: Shape) -> Shape:
-    """Convex hull of a mesh; the shape itself when it is no mesh, or so flat that it has no hull."""
+    """Convex hull of a mesh; the shape itself when it is not a mesh, or so flat that it has no hull."""
     return (_hull_of(shape) or shape) if shape.is_mesh else shape
 
 

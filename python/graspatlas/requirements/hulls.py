@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from graspatlas import _core
+from graspatlas.support.arrays import Array
 
 __all__ = ["corners_of_hull", "mesh_volume", "shallow_volume"]
-
-Array = NDArray[np.float64]
 
 #: Hulls with at most this many corners stay as they are; coal's corners have at most 255 neighbours.
 FEW_CORNERS = 250
@@ -31,14 +30,14 @@ def corners_of_hull(points: Array) -> tuple[Array, float]:
     until what is left out is within :data:`LARGEST_ERROR`.
 
     Args:
-        points: The points [n, 3], metres.
+        points: The points (n, 3), metres.
 
     Returns:
-        The corners [c, 3], and a distance within which all points are from their hull [m]: 0 where nothing was thinned.
+        The corners (c, 3), and a distance within which all points are from their hull [m]: 0 where nothing was thinned.
 
     Raises:
         scipy.spatial.QhullError: If the points have no volume.
-        ValueError: If they are too few, or no numbers.
+        ValueError: If they are too few, or not numbers.
     """
     if len(points) <= MANY_POINTS:
         points = points[ConvexHull(points).vertices]
@@ -84,7 +83,7 @@ def _outermost(points: Array) -> NDArray[np.intp]:
 
 
 def _above(points: Array, planes: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Height of each point above the plane that it is highest above [n], negative inside, and that plane [n]."""
+    """Height of each point above the plane that it is highest above (n,), negative inside, and that plane (n,)."""
     heights, highest = np.empty(len(points)), np.empty(len(points), np.intp)
     step = max(1, AT_A_TIME // len(planes))
     for start in range(0, len(points), step):

@@ -7,7 +7,7 @@ from typing import NoReturn
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasps
-from graspatlas.requirements.screening import Require, Requirement
+from graspatlas.requirements.base import Requirement, RequirementLike
 
 __all__ = ["Lost", "kept"]
 
@@ -41,6 +41,6 @@ class Lost(Requirement):
         return self.label
 
 
-def kept(requirements: tuple[Require, ...]) -> tuple[Require, ...]:
+def kept(requirements: tuple[RequirementLike, ...]) -> tuple[RequirementLike, ...]:
     """The requirements that can be asked: all but those that a file did not keep."""
     return tuple(r for r in requirements if not isinstance(r, Lost))

@@ -17,8 +17,9 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.columns import contact_columns, grasp_columns
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.hand.urdf import root_link
-from graspatlas.quality.evaluation import INDICES, evaluate, quality_name
-from graspatlas.requirements.screening import requirement_name
+from graspatlas.quality.batched import quality_name
+from graspatlas.quality.evaluation import INDICES, evaluate
+from graspatlas.requirements.base import requirement_name
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.support.columns import joined
 from graspatlas.support.files import replaced, write_csv

@@ -15,9 +15,10 @@ from graspatlas.atlas.atlas import LARGEST, Atlas
 from graspatlas.atlas.status import Audit, Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.problem import Problem
-from graspatlas.quality.evaluation import quality_name
+from graspatlas.problem.requirement import parse_requirement
+from graspatlas.quality.batched import quality_name
+from graspatlas.requirements.base import RequirementLike, requirement_name
 from graspatlas.requirements.lost import Lost
-from graspatlas.requirements.screening import Require, parse_requirement, requirement_name
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.result.refinement import Refinement
 from graspatlas.support.archives import DamagedArchive, read_arrays
@@ -200,7 +201,8 @@ def check_configurations(problem: Problem, X: NDArray[np.float64], what: str) ->
     n_hand = problem.hand.model.hand_q_size
     turning = [joint.q_index for joint in problem.hand.model.hand_joints if joint.q_size == 2]
     parts = [("the cosine and sine of a continuous joint", slice(at, at + 2)) for at in turning]
-    at, size = (n_hand + 3, 4) if problem.object_joint == "free_flyer" else (n_hand + 2, 2)
+    joint = problem.object_joint_model
+    at, size = n_hand + joint.translations, joint.size - joint.translations
     parts.append(("the object's rotation", slice(at, at + size)))
     for name, columns in parts:
         lengths = np.linalg.norm(X[:, columns], axis=1)
@@ -235,7 +237,7 @@ def _sound(name: str, array: Any) -> bool:
     return bool((~np.isnan(array) if name == "qualities" else np.isfinite(array)).all())
 
 
-def _stored_requirement(text: str) -> Require:
+def _stored_requirement(text: str) -> RequirementLike:
     """The requirement of a name; of a function, which is not stored, what stands for it."""
     try:
         return parse_requirement(text)

@@ -16,8 +16,10 @@ from graspatlas.atlas.status import Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasp, Grasps
 from graspatlas.problem.problem import Problem
-from graspatlas.quality.evaluation import Quality, evaluate, quality_name
-from graspatlas.requirements.screening import Require, screen
+from graspatlas.quality.batched import Quality, quality_name
+from graspatlas.quality.evaluation import evaluate
+from graspatlas.requirements.base import RequirementLike
+from graspatlas.requirements.screening import screen
 from graspatlas.result.refinement import Refinement
 from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.support.pickling import Light
@@ -52,7 +54,7 @@ class GraspAtlas(Light):
     quality: Quality
     qualities: Array
     quality_seconds: float
-    requirements: tuple[Require, ...]
+    requirements: tuple[RequirementLike, ...]
     accepted: BoolArray
     rejected: Mapping[str, int]
     others: Mapping[str, Array] = field(default_factory=dict)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from graspatlas.atlas.verification import CheckReport
 from graspatlas.grasps.columns import grasp_columns, parameter_columns
 from graspatlas.grasps.grasps import Grasp, Grasps
-from graspatlas.quality.evaluation import quality_name
+from graspatlas.quality.batched import quality_name
 from graspatlas.result.exports import save_grasps
 from graspatlas.result.files import read_result, save_result
 from graspatlas.result.grasp_atlas import GraspAtlas

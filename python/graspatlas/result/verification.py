@@ -12,8 +12,9 @@ from graspatlas.atlas.verification import RESIDUAL_TOLERANCE, Check, CheckReport
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.problem.problem import Problem
 from graspatlas.quality.evaluation import INDICES, evaluate
+from graspatlas.requirements.base import requirement_name
 from graspatlas.requirements.lost import kept
-from graspatlas.requirements.screening import requirement_name, screen
+from graspatlas.requirements.screening import screen
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.result.refinement import Refinement
 

@@ -12,7 +12,6 @@ import time
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from graspatlas import _core
@@ -20,6 +19,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.problem import Problem
 from graspatlas.search.random_starts import Starts
 from graspatlas.search.starts_near_guess import starts_near
+from graspatlas.support.arrays import Array
 from graspatlas.support.deadlines import deadline_after
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.progress import progress_bar
@@ -28,14 +28,12 @@ from graspatlas.systems.projection import project
 
 __all__ = ["MAX_TRIES", "GraspSearch", "find_grasps", "with_first_grasp"]
 
-Array = NDArray[np.float64]
-
 #: Tries in a row without a grasp after which a search is given up: about half a minute.
 MAX_TRIES = 20_000
 #: Two grasps are one when their embeddings are nearer than this [units of the tangent space].
 SAME = 1e-6
 #: Grasps in a row from which no atlas can grow; then the equations are redundant everywhere, and the atlas says so.
-MAX_SPECIAL = 50
+MAX_SINGULAR = 50
 #: A chart of this radius is laid at a grasp to see whether an atlas can grow there.
 TRIAL_RADIUS, TRIAL_EPSILON = 1e-2, 0.5
 
@@ -66,11 +64,11 @@ def find_grasps(
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
     Returns:
-        The grasps, one a row [n, size of x], all with |R(x)| of at most 1e-9 and within all bounds; n is smaller than
+        The grasps, one a row (n, size of x), all with |R(x)| of at most 1e-9 and within all bounds; n is smaller than
         `count`, perhaps 0, when the search ended early.
 
     Raises:
-        GraspAtlasError: If an argument makes no sense.
+        GraspAtlasError: If an argument is out of its range.
     """
     whole(count, "count")
     if not isinstance(problem, Problem):
@@ -145,7 +143,7 @@ class GraspSearch:
         self._near_guess = starts_near(guess, self._starts, self._rng) if guess else iter(())
 
     def next_grasp(self, deadline: float, bar: tqdm[None]) -> Array | None:
-        """The next grasp [size of x]; None after ``MAX_TRIES`` tries without one, or when the clock passes `deadline`.
+        """The next grasp (size of x,); None after ``MAX_TRIES`` tries without one, or when the clock passes `deadline`.
 
         Args:
             deadline: Reading of ``time.perf_counter`` [s].
@@ -161,9 +159,9 @@ class GraspSearch:
         return None
 
     def next_start(self, deadline: float, bar: tqdm[None]) -> Array | None:
-        """The next grasp from which an atlas can grow; or a special one, when ``MAX_SPECIAL`` in a row are special."""
+        """The next grasp from which an atlas can grow; or a singular one, after ``MAX_SINGULAR`` of these in a row."""
         first = None
-        for _ in range(MAX_SPECIAL):
+        for _ in range(MAX_SINGULAR):
             x = self.next_grasp(deadline, bar)
             if x is None or self.is_regular(x):
                 return first if x is None else x
@@ -171,7 +169,7 @@ class GraspSearch:
         return first
 
     def is_regular(self, x: Array) -> bool:
-        """False for a special grasp, at which the equations lose rank, or so nearly that it slips across a bound."""
+        """False for a singular grasp, at which the equations lose rank, or so nearly that it slips across a bound."""
         try:
             _core.AtlasBuilder(self.system, x, TRIAL_RADIUS, TRIAL_EPSILON, 1)
         except GraspAtlasError:
@@ -179,7 +177,7 @@ class GraspSearch:
         return True
 
     def attempt(self) -> Array | None:
-        """One try: a feasible grasp [size of x], or None."""
+        """One try: a feasible grasp (size of x,), or None."""
         self.tries += 1
         # The first grasp only: what is found later must tell of all grasps, not of those near the guess.
         start = next(self._near_guess, None) if self.found == 0 else None

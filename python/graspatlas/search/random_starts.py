@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from graspatlas import _core
 from graspatlas.problem.problem import Problem
+from graspatlas.support.arrays import Array
 
 __all__ = ["Starts"]
-
-Array = NDArray[np.float64]
 
 #: Steps of the random walk through the hand postures from one start to the next.
 WALK_STEPS = 12
@@ -39,9 +37,10 @@ class Starts:
 
     def __init__(self, problem: Problem, system: _core.GraspSystem) -> None:
         self._problem, self._system = problem, system
-        self._pose = [0.0, 0.0, 1.0, 0.0] if problem.object_joint == "planar" else [0.0] * 6 + [1.0]
+        self._joint = problem.object_joint_model
         q = problem.reference_array
-        self._reference = np.r_[q, self._pose, np.zeros(system.n_parameters)]
+        self._pose = slice(len(q), len(q) + self._joint.size)
+        self._reference = np.r_[q, self._joint.neutral, np.zeros(system.n_parameters)]
         places = problem.hand.link_placements(q)
         self.hand_size = max(float(np.linalg.norm(T[:3, 3])) for T in places.values()) + problem.length_scale
         free = [patch.interval(name) or (-HALF_TURN, HALF_TURN) for c in problem.contacts for patch, name in c.free()]
@@ -52,7 +51,7 @@ class Starts:
         self._y = self._middle()
 
     def draw(self, rng: np.random.Generator) -> Array:
-        """A start [configuration_size]; its bounds hold, and its contacts nearly do."""
+        """A start (configuration_size,); its bounds hold, and its contacts nearly do."""
         for _ in range(WALK_STEPS):
             self._y = self._walk(rng)
         step = np.zeros(self._system.tangent_size)
@@ -62,57 +61,44 @@ class Starts:
         return self._place_object(x, rng)
 
     def at_pose(self, xyz: Array, rotation: Rotation, rng: np.random.Generator) -> Array:
-        """A start [configuration_size] in the reference posture, the object's patches nearest to the hand's points.
+        """A start (configuration_size,) in the reference posture, the object's patches nearest to the hand's points.
 
         Args:
-            xyz: Position of the object in the palm's frame [3], metres.
+            xyz: Position of the object in the palm's frame (3,), metres.
             rotation: Its rotation.
             rng: Random numbers, for the free parameters of the hand's patches.
         """
         x: Array = self._reference.copy()
-        self._set_pose(x, xyz, rotation)
+        x[self._pose] = self._joint.nearest(xyz, rotation)
         at = len(x) - len(self._lower)
         x[at:] = rng.uniform(self._lower, self._upper)
         points = (self._system.grasp_arrays(x[None])["hand_points"][0] - xyz) @ rotation.as_matrix()
         for contact, point in zip(self._problem.contacts, points, strict=True):
-            on_object = [name for name in contact.object.parameters if name not in contact.frozen]
-            nearest = dict(zip("uv", contact.object.locate(point), strict=True))
-            at += len(contact.free())
-            x[at - len(on_object) : at] = [nearest[name] for name in on_object]
+            of_hand, of_object = contact.sides
+            at += len(of_hand.free)
+            x[at : at + len(of_object.free)] = of_object.values_of_free(of_object.patch.locate(point))
+            at += len(of_object.free)
         first = len(x) - len(self._lower)
         x[first:] = np.clip(x[first:], self._lower, self._upper)
         return x
 
     def pose(self, x: Array) -> tuple[Array, Rotation]:
-        """Position [3] and rotation of the object in the palm's frame at a configuration x."""
-        at = len(self._problem.reference_array)
-        if self._problem.object_joint == "planar":
-            return np.r_[x[at : at + 2], 0.0], Rotation.from_rotvec([0.0, 0.0, np.arctan2(x[at + 3], x[at + 2])])
-        return x[at : at + 3], Rotation.from_quat(x[at + 3 : at + 7])
-
-    def _set_pose(self, x: Array, xyz: Array, rotation: Rotation) -> None:
-        """Put the object of a configuration x there; in the plane only what lies in it counts."""
-        at = len(self._problem.reference_array)
-        if self._problem.object_joint == "planar":
-            R = rotation.as_matrix()
-            angle = np.arctan2(R[1, 0], R[0, 0])
-            x[at : at + 4] = [*xyz[:2], np.cos(angle), np.sin(angle)]
-        else:
-            x[at : at + 7] = [*xyz, *rotation.as_quat()]
+        """Position (3,) and rotation of the object in the palm's frame at a configuration x."""
+        return self._joint.to_rotation(x[self._pose])
 
     def has_posture_of(self, x: Array) -> bool:
         """True when a grasp x has a posture that could be drawn, its unlimited joints within half a turn."""
         d = self._joint_steps(x)
         return bool(np.abs(d - self._motions @ np.linalg.lstsq(self._motions, d)[0]).max() < OFF)
 
-    def _joint_steps(self, x: NDArray[np.float64]) -> Array:
+    def _joint_steps(self, x: Array) -> Array:
         """From the reference posture to that of x [rad or length_scale]; the shorter way round."""
         problem = self._problem
         nq = problem.hand.model.hand_q_size
         return problem.hand.joint_steps(self._reference[:nq], x[:nq]) / problem.joint_units
 
     def _kept_motions(self) -> Array:
-        """The hand motions that are kept, as columns of joint steps [nv, p]."""
+        """The hand motions that are kept, as columns of joint steps (nv, p)."""
         system = self._system
         p = system.tangent_size - system.object_dof - system.n_parameters
         units = np.eye(system.tangent_size)[:p]
@@ -136,7 +122,7 @@ class Starts:
         return np.array(A), np.array(b)
 
     def _middle(self) -> Array:
-        """Centre of the largest ball of postures within the limits [p]."""
+        """Centre of the largest ball of postures within the limits (p,)."""
         lengths = np.linalg.norm(self._A, axis=1)
         aim = np.r_[np.zeros(self._A.shape[1]), -1.0]
         found = linprog(
@@ -161,18 +147,16 @@ class Starts:
         lever = max(float(np.linalg.norm(hand - hand.mean(axis=0), axis=1).mean()), self._problem.length_scale)
         to = np.concatenate([hand, hand + lever * arrays["hand_normals"][0]])
         of = np.concatenate([body, body - lever * arrays["object_normals"][0]])
-        d = 2 if self._problem.object_joint == "planar" else 3
+        d = self._joint.translations
         # The rotation that points in a row leave open is drawn.
-        any_way = np.eye(2) if d == 2 else Rotation.from_quat(rng.normal(size=4)).as_matrix()
+        any_way = self._joint.random_rotation(rng)
         R, t = _best_motion(of[:, :d] @ any_way.T, to[:, :d])
-        R, at = R @ any_way, len(self._problem.reference_array)
-        turn = [R[0, 0], R[1, 0]] if d == 2 else Rotation.from_matrix(R).as_quat()
-        x[at : at + len(self._pose)] = [*t, *turn]
+        x[self._pose] = self._joint.from_motion(R @ any_way, t)
         return x
 
 
 def _best_motion(of: Array, to: Array) -> tuple[Array, Array]:
-    """Rotation R [d, d] and translation t [d] with the least squares of R of + t - to, points as rows [n, d].
+    """Rotation R (d, d) and translation t (d,) with the least squares of R of + t - to, points as rows (n, d).
 
     Source: S. Umeyama, "Least-Squares Estimation of Transformation Parameters Between Two Point Patterns", PAMI 1991.
     """

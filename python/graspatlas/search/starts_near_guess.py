@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from graspatlas.problem.pose_guess import PoseGuess
 from graspatlas.search.random_starts import Starts
+from graspatlas.support.arrays import Array
 
 __all__ = ["starts_near"]
-
-Array = NDArray[np.float64]
 
 #: Starts with the object at the guess and the hand in its reference posture, each a little further off.
 AT_GUESS = 20
@@ -35,7 +33,7 @@ def starts_near(guess: PoseGuess, starts: Starts, rng: np.random.Generator) -> I
         rng: Random numbers.
 
     Yields:
-        Starts [configuration_size].
+        Starts (configuration_size,).
     """
     for i in range(AT_GUESS):
         far = i / AT_GUESS

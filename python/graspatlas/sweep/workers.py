@@ -13,7 +13,7 @@ from typing import Any
 from graspatlas.errors import GraspAtlasError
 from graspatlas.optimizer.optimize import optimize
 from graspatlas.problem.problem import Problem
-from graspatlas.requirements.screening import parse_requirement
+from graspatlas.problem.requirement import parse_requirement
 from graspatlas.result.result import Result
 from graspatlas.support.machine import available_threads
 from graspatlas.sweep.runs import Run

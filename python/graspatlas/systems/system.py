@@ -16,10 +16,11 @@ A system written in Python is a subclass of :class:`System`::
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from graspatlas._core import Angles, AnySystem, PythonSystem, Rotations, Sphere, Torus
 from graspatlas.errors import GraspAtlasError
+from graspatlas.support.arrays import Array
 from graspatlas.support.validation import number_array, whole
 
 __all__ = [
@@ -34,7 +35,6 @@ __all__ = [
     "jacobian_error",
 ]
 
-Array = NDArray[np.float64]
 
 #: Variables that a system may have: its Jacobians are dense.
 MOST_VARIABLES = 10_000
@@ -51,11 +51,11 @@ class System(PythonSystem):
     Args:
         n_variables: Numbers in x.
         n_equations: Numbers in R(x); fewer than the variables.
-        lower: Lower bounds of x [n_variables], or one number for all; infinite by default.
+        lower: Lower bounds of x (n_variables,), or one number for all; infinite by default.
         upper: Upper bounds of x, likewise.
 
     Raises:
-        GraspAtlasError: If the sizes or the bounds make no sense.
+        GraspAtlasError: If a size is out of its range, or the bounds are not one number or n_variables.
     """
 
     def __init__(
@@ -75,11 +75,11 @@ class System(PythonSystem):
         super().__init__(n_variables, n_equations, low, high)
 
     def residual(self, x: Array) -> ArrayLike:
-        """R(x) [n_equations]."""
+        """R(x) (n_equations,)."""
         raise NotImplementedError
 
     def jacobian(self, x: Array) -> ArrayLike:
-        """Derivative of R at x [n_equations, n_variables]."""
+        """Derivative of R at x (n_equations, n_variables)."""
         raise NotImplementedError
 
 
@@ -90,7 +90,7 @@ def jacobian_error(system: AnySystem, x: ArrayLike, step: float = 1e-6) -> float
 
     Args:
         system: Any system.
-        x: A point [configuration_size], on the manifold or not.
+        x: A point (configuration_size,), on the manifold or not.
         step: Length of the differences in the tangent space.
 
     Returns:
@@ -136,7 +136,7 @@ def check_jacobian(system: AnySystem, x: ArrayLike) -> None:
 
     Args:
         system: Any system; compiled ones are not asked.
-        x: A point [configuration_size].
+        x: A point (configuration_size,).
 
     Raises:
         GraspAtlasError: If all differences say that the Jacobian is another one.

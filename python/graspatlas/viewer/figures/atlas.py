@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graspatlas.atlas.atlas import Atlas
 from graspatlas.errors import GraspAtlasError
-from graspatlas.quality.evaluation import quality_name
+from graspatlas.quality.batched import quality_name
 from graspatlas.result.result import Result
 from graspatlas.viewer.figures.polygons import Coordinates, chart_polygons, default_coordinates, open_charts
 from graspatlas.viewer.figures.style import BLUE, INK, PAGE, RED, REJECTED, SINGULAR, Picture, styled

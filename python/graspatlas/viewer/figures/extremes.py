@@ -62,7 +62,7 @@ def plot_best_and_worst(
 def _draw_grasps(figure: Any, result: Result) -> None:
     problem = result.problem
     grasps = {"worst": result.worst, "best": result.best}
-    planar = problem.object_joint == "planar"
+    planar = problem.object_joint_model.planar
     direction = None if planar else common_direction(problem, list(grasps.values()))
     lengths = [extreme_semi_axes(problem, grasp)[0] for grasp in grasps.values()]
     to_scale = max(lengths) <= ONE_SCALE * min(lengths)

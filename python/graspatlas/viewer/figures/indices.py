@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from graspatlas.analysis.peaks import local_maxima
 from graspatlas.grasps.grasps import Grasp, Grasps
-from graspatlas.quality.evaluation import INDICES, batched, evaluate
+from graspatlas.quality.batched import batched
+from graspatlas.quality.evaluation import INDICES, evaluate
 from graspatlas.result.result import Result
 from graspatlas.viewer.figures.atlas import VIEWS, AtlasDrawing
 from graspatlas.viewer.figures.ellipse import draw_ellipses, extreme_semi_axes, unit_of

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from graspatlas.analysis.climb import Climb, climb
 from graspatlas.analysis.peaks import Peak, local_maxima, peaks_of
 from graspatlas.errors import GraspAtlasError
-from graspatlas.quality.evaluation import quality_name
+from graspatlas.quality.batched import quality_name
 from graspatlas.result.result import Result
 from graspatlas.viewer.figures.atlas import VIEWS, AtlasDrawing
 from graspatlas.viewer.figures.polygons import Coordinates

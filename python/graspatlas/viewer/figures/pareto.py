@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from graspatlas.analysis.pareto import knee, pareto_front, values_of
-from graspatlas.quality.evaluation import Quality, quality_name
+from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.result.result import Result
 from graspatlas.viewer.figures.planar import draw_planar_grasp
 from graspatlas.viewer.figures.portrait import common_direction, portrait
@@ -123,7 +123,7 @@ def _draw_portraits(figure: Any, result: Result, shown: list[_Portrayed], values
     """The marked grasps, one above the other, seen from one side, with their symbols and values."""
     problem = result.problem
     grasps = [result.grasp(portrayed.chart) for portrayed in shown]
-    planar = problem.object_joint == "planar"
+    planar = problem.object_joint_model.planar
     direction = None if planar else common_direction(problem, grasps)
     for number, (portrayed, grasp) in enumerate(zip(shown, grasps, strict=True)):
         bottom = 1.0 - (number + 1) / 3.0

@@ -49,7 +49,7 @@ def plot_planar_grasp(problem: Problem, grasp: Grasp) -> Picture:
 
 def require_planar(problem: Problem) -> None:
     """Raise a GraspAtlasError for problems that are not planar."""
-    if problem.object_joint != "planar":
+    if not problem.object_joint_model.planar:
         raise GraspAtlasError(
             f"problem '{problem.name}' is not planar; draw its grasps with plot_best_and_worst or graspatlas.view"
         )

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasp
 from graspatlas.paths.path import GraspPath, Path
+from graspatlas.support.arrays import Array, IntArray
 from graspatlas.viewer.scene.bodies import BodyShapes
 from graspatlas.viewer.scene.camera import Camera
 from graspatlas.viewer.scene.meshes import arrow, ellipsoid, frame_along
@@ -28,8 +28,6 @@ from graspatlas.viewer.scene.scene import (
 )
 
 __all__ = ["Film"]
-
-Array = NDArray[np.float64]
 
 #: Most frames of a film; of a path with more points, so many are shown, evenly chosen.
 MAX_FRAMES = 300
@@ -54,7 +52,7 @@ class Film:
         if not isinstance(path, GraspPath):
             raise GraspAtlasError("this path is not one of grasps, so there is no hand to show; plot path.x instead")
         self.path = path
-        #: Points of the path that are shown [f].
+        #: Points of the path that are shown (f,).
         self.points = _evenly_chosen(len(path), frames)
         grasps = [path.grasps[int(i)] for i in self.points]
         shapes = BodyShapes(path.result.problem)
@@ -62,17 +60,17 @@ class Film:
         size = size_of(shots[0])
         parts = shots[0] + _marks(grasps[0], size)
         S = np.diag([1.0 / size, 1.0 / size, 1.0 / size, 1.0])
-        #: Placement of each part in each frame, scaled to the usual size [f, parts, 4, 4].
+        #: Placement of each part in each frame, scaled to the usual size (f, parts, 4, 4).
         self.T: Array = S @ np.array(
             [[p.T for p in shot] + _mark_placements(grasp) for shot, grasp in zip(shots, grasps, strict=True)]
         )
         #: Each part as in the first frame.
         self.parts = tuple(replace(part, T=T) for part, T in zip(parts, self.T[0], strict=True))
-        #: Which parts move [parts].
+        #: Which parts move (parts,).
         self.moving = (np.ptp(self.T, axis=0) > STILL).any(axis=(1, 2))
         subjects = [subject_of(shots[i] + _marks(grasps[i], size), grasps[i], size) for i in (0, -1)]
-        #: Unit vector to the camera [3].
-        self.direction = direction_to(subjects, planar=len(grasps[0].G) < 6)
+        #: Unit vector to the camera (3,).
+        self.direction = direction_to(subjects, path.result.problem.object_joint_model)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -87,7 +85,7 @@ class Film:
         return fitted_camera(points, self.direction, aspect, window)
 
 
-def _evenly_chosen(n: int, most: int) -> NDArray[np.int64]:
+def _evenly_chosen(n: int, most: int) -> IntArray:
     """The first and the last of n, and others between, at most so many."""
     return np.unique(np.linspace(0, n - 1, min(n, most)).round().astype(np.int64))
 
@@ -103,7 +101,7 @@ def _marks(grasp: Grasp, size: float) -> list[Part]:
 
 
 def _mark_placements(grasp: Grasp) -> list[Array]:
-    """Placements of the balls and arrows [4, 4], in the order of :func:`_marks`."""
+    """Placements of the balls and arrows (4, 4), in the order of :func:`_marks`."""
     placements = []
     for point, normal in zip(grasp.contact_points, grasp.contact_normals, strict=True):
         T = np.eye(4)

@@ -6,18 +6,16 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.hand.hand import Body
+from graspatlas.hand.body import Body
 from graspatlas.hand.mesh_files import check_meshes
 from graspatlas.problem.problem import Problem
+from graspatlas.support.arrays import Array
 from graspatlas.viewer.scene.meshes import Mesh, from_coal
 from graspatlas.viewer.scene.stick_figure import Shape, bones, outlines
 
 __all__ = ["BodyShapes"]
-
-Array = NDArray[np.float64]
 
 
 class BodyShapes:
@@ -32,12 +30,12 @@ class BodyShapes:
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
-        self._files: dict[tuple[Any, ...], Mesh | None] = {}
+        self._files: dict[tuple[str | float, ...], Mesh | None] = {}
         self._hand = self._read(problem.hand)
         self._object = self._read(problem.object)
 
     def hand(self, q: Array) -> Iterator[Shape]:
-        """The hand at joint configuration q [nq]."""
+        """The hand at joint configuration q (nq,)."""
         if not self._hand[1].ngeoms:
             return bones(self._problem, self._hand[0], q)
         return self._placed(*self._hand, q)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from graspatlas.paths.path import GraspPath
-from graspatlas.quality.evaluation import INDICES, quality_name
-from graspatlas.requirements.screening import requirement_name
+from graspatlas.quality.batched import quality_name
+from graspatlas.quality.evaluation import INDICES
+from graspatlas.requirements.base import requirement_name
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.viewer.scene.scene import COLOURS, Colour, Exhibit
 
@@ -33,7 +34,7 @@ class Caption:
 
 def caption(result: GraspAtlas, exhibit: Exhibit) -> Caption:
     """What is written beside one of the grasps."""
-    axes = [1000.0 * axis for axis in exhibit.semi_axes[: 3 if len(exhibit.grasp.G) == 6 else 2]]
+    axes = [1000.0 * axis for axis in exhibit.semi_axes[: result.problem.object_joint_model.translations]]
     reach = ", ".join(f"{axis if axis > ROUNDING else 0.0:.3g}" for axis in axes)
     moves = max(axes) > ROUNDING
     return Caption(

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
+
+from graspatlas.support.arrays import Array, IntArray
 
 __all__ = [
     "Mesh",
@@ -24,9 +26,6 @@ __all__ = [
     "tube",
 ]
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
 #: Faces that meet at a smaller angle share a normal and look round [rad].
 CREASE = np.radians(38.0)
 #: Sides of round shapes.
@@ -38,9 +37,9 @@ class Mesh:
     """A triangle mesh.
 
     Attributes:
-        vertices: Vertices [n, 3], metres.
-        normals: Outward unit normals at the vertices [n, 3].
-        faces: Indices of the corners of each triangle [f, 3], counterclockwise seen from outside.
+        vertices: Vertices (n, 3), metres.
+        normals: Outward unit normals at the vertices (n, 3).
+        faces: Indices of the corners of each triangle (f, 3), counterclockwise seen from outside.
     """
 
     vertices: Array
@@ -48,7 +47,7 @@ class Mesh:
     faces: IntArray
 
     def moved(self, T: Array) -> Mesh:
-        """The mesh at placement T [4, 4]: a rotation, a translation, and one scale if any."""
+        """The mesh at placement T (4, 4): a rotation, a translation, and one scale if any."""
         turned = self.normals @ T[:3, :3].T / np.linalg.norm(T[:3, 0])
         return Mesh(self.vertices @ T[:3, :3].T + T[:3, 3], turned, self.faces)
 
@@ -57,8 +56,8 @@ def smooth(vertices: ArrayLike, faces: ArrayLike, crease: float = CREASE) -> Mes
     """Mesh whose normals are averaged over faces that meet at less than the crease angle.
 
     Args:
-        vertices: Vertices [n, 3], metres.
-        faces: Triangles [f, 3].
+        vertices: Vertices (n, 3), metres.
+        faces: Triangles (f, 3).
         crease: The angle [rad].
     """
     points = np.asarray(vertices, float)
@@ -102,7 +101,7 @@ def lathe(profile: ArrayLike, sides: int = SIDES) -> Mesh:
     """Surface of revolution about z.
 
     Args:
-        profile: Radius and height of the outline's points from bottom to top [n, 2], metres.
+        profile: Radius and height of the outline's points from bottom to top (n, 2), metres.
         sides: How many flat sides stand for the circle.
     """
     outline = np.asarray(profile, float)
@@ -127,7 +126,7 @@ def _between_rings(n: int, sides: int) -> IntArray:
 
 
 def ellipsoid(radii: ArrayLike, sides: int = SIDES) -> Mesh:
-    """Ellipsoid about the origin with semi-axes along x, y and z [3], metres."""
+    """Ellipsoid about the origin with semi-axes along x, y and z (3,), metres."""
     scale = np.asarray(radii, float)
     angle = np.linspace(-np.pi / 2.0, np.pi / 2.0, sides // 2 + 1)
     radius = np.cos(angle)
@@ -139,7 +138,7 @@ def ellipsoid(radii: ArrayLike, sides: int = SIDES) -> Mesh:
 
 
 def box(lengths: ArrayLike) -> Mesh:
-    """Box about the origin with edges along x, y and z [3], metres."""
+    """Box about the origin with edges along x, y and z (3,), metres."""
     corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
@@ -155,7 +154,7 @@ def capsule(radius: float, half_length: float) -> Mesh:
 
 
 def arrow(start: Array, direction: Array, length: float, radius: float) -> Mesh:
-    """Arrow from a point [3] along a unit vector [3]; length and radius of its shaft in metres."""
+    """Arrow from a point (3,) along a unit vector (3,); length and radius of its shaft in metres."""
     neck = length - 5.0 * radius
     outline = [(0.0, 0.0), (radius, 0.0), (radius, neck), (2.6 * radius, neck), (0.0, length)]
     shape = lathe(outline, 20)
@@ -163,7 +162,7 @@ def arrow(start: Array, direction: Array, length: float, radius: float) -> Mesh:
 
 
 def tube(path: Array, radius: float) -> Mesh:
-    """Open tube along points [n, 3] that lie in a plane, or nearly so; metres."""
+    """Open tube along points (n, 3) that lie in a plane, or nearly so; metres."""
     flat = np.eye(3)[np.argmin(np.ptp(path, axis=0))]
     along = np.gradient(path, axis=0)
     x = np.cross(along, flat)
@@ -176,7 +175,7 @@ def tube(path: Array, radius: float) -> Mesh:
 
 
 def frame_along(direction: Array, origin: Array) -> Array:
-    """Placement [4, 4] at a point [3] with z along a unit vector [3]."""
+    """Placement (4, 4) at a point (3,) with z along a unit vector (3,)."""
     least = np.eye(3)[np.argmin(np.abs(direction))]
     x = np.cross(least, direction)
     x /= np.linalg.norm(x)

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.grasps.grasps import Grasp
+from graspatlas.problem.object_joint import ObjectJoint
 from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.support.arrays import Array
 from graspatlas.viewer.scene.bodies import BodyShapes
 from graspatlas.viewer.scene.camera import Camera
 from graspatlas.viewer.scene.meshes import Mesh, arrow, ellipsoid, merged
@@ -32,7 +33,6 @@ __all__ = [
     "vertices_of",
 ]
 
-Array = NDArray[np.float64]
 #: Red, green, blue and opacity, each 0 to 1.
 Colour = tuple[float, float, float, float]
 
@@ -68,7 +68,7 @@ class Part:
     Attributes:
         group: ``hand``, ``object``, ``contact``, ``normal`` or ``ellipsoid``.
         mesh: The mesh; the same one may stand in several parts.
-        T: Its placement [4, 4].
+        T: Its placement (4, 4).
         colour: Red, green, blue and opacity, each 0 to 1.
     """
 
@@ -86,7 +86,7 @@ class Exhibit:
         name: ``best`` or ``worst``.
         grasp: The grasp.
         parts: Its meshes, placed in the world.
-        semi_axes: Semi-axes of the object's velocity ellipsoid, longest first [3], metres a radian.
+        semi_axes: Semi-axes of the object's velocity ellipsoid, longest first (3,), metres a radian.
     """
 
     name: str
@@ -96,7 +96,7 @@ class Exhibit:
 
     @cached_property
     def points(self) -> Array:
-        """Vertices of hand, object and normals: what must be in the picture [n, 3]."""
+        """Vertices of hand, object and normals: what must be in the picture (n, 3)."""
         return vertices_of(list(self.parts), ("hand", "object", "normal"))
 
 
@@ -119,7 +119,7 @@ class Scene:
         size = size_of(body_parts(shapes, best))
         sides = [(name, grasp, *grasp_parts(shapes, grasp, size)) for name, grasp in grasps]
         subjects = [subject_of(parts, grasp, size) for _, grasp, parts, _ in sides]
-        self.direction = direction_to(subjects, planar=len(result.best.G) < 6)
+        self.direction = direction_to(subjects, result.problem.object_joint_model)
         right = Camera(np.zeros(3), self.direction, 1.0).axes[0]
         #: Best, then worst.
         self.exhibits = tuple(
@@ -138,13 +138,13 @@ class Scene:
         return fitted_camera(points, self.direction, aspect, window)
 
 
-def direction_to(subjects: list[Subject], *, planar: bool) -> Array:
-    """Unit vector [3] towards the camera: from above in the plane, else from where most is seen."""
-    return FROM_ABOVE / np.linalg.norm(FROM_ABOVE) if planar else best_direction(subjects)
+def direction_to(subjects: list[Subject], joint: ObjectJoint) -> Array:
+    """Unit vector (3,) towards the camera: from above where the object stays in a plane, else where most is seen."""
+    return FROM_ABOVE / np.linalg.norm(FROM_ABOVE) if joint.planar else best_direction(subjects)
 
 
 def fitted_camera(points: Array, direction: Array, aspect: float, window: tuple[float, float, float, float]) -> Camera:
-    """Camera that shows points [n, 3] from a direction [3] inside a window of its picture; see :meth:`Scene.camera`."""
+    """Camera that shows points (n, 3) from a direction (3,) in a window of its picture; see :meth:`Scene.camera`."""
     low, high = np.array([window[0], window[2]]), np.array([window[1], window[3]])
     camera = Camera(points.mean(axis=0), direction, 1.0)
     for _ in range(MAX_FRAMING_STEPS):
@@ -174,7 +174,7 @@ def grasp_parts(shapes: BodyShapes, grasp: Grasp, size: float = 1.0) -> tuple[li
         size: Scale of what is drawn on top of hand and object.
 
     Returns:
-        The parts, and the semi-axes of the velocity ellipsoid, longest first [3], metres a radian.
+        The parts, and the semi-axes of the velocity ellipsoid, longest first (3,), metres a radian.
     """
     parts = body_parts(shapes, grasp)
     ball = ellipsoid(np.full(3, size * CONTACT_RADIUS), 24)
@@ -195,7 +195,7 @@ def grasp_parts(shapes: BodyShapes, grasp: Grasp, size: float = 1.0) -> tuple[li
 
 
 def vertices_of(parts: list[Part], groups: tuple[str, ...] = ("hand", "object")) -> Array:
-    """All vertices of parts of some groups [n, 3]."""
+    """All vertices of parts of some groups (n, 3)."""
     return np.concatenate([p.mesh.moved(p.T).vertices for p in parts if p.group in groups])
 
 

@@ -6,15 +6,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.problem.problem import Problem
+from graspatlas.support.arrays import Array
 from graspatlas.viewer.scene.meshes import Mesh, capsule, ellipsoid, frame_along, smooth, tube
 
 __all__ = ["Shape", "bones", "outlines"]
 
-Array = NDArray[np.float64]
-#: A mesh, its placement [4, 4] and its colour (red, green, blue, opacity).
+#: A mesh, its placement (4, 4) and its colour (red, green, blue, opacity).
 Shape = tuple[Mesh, Array, tuple[float, float, float, float]]
 
 BONE = (0.80, 0.81, 0.83, 1.0)
@@ -33,7 +32,7 @@ def bones(problem: Problem, model: Any, q: Array) -> Iterator[Shape]:
     Args:
         problem: The problem.
         model: Pinocchio's model of the hand.
-        q: Its joint configuration [nq].
+        q: Its joint configuration (nq,).
     """
     joints, lines = _skeleton(problem, model, q)
     size = bone_length(problem)
@@ -78,11 +77,12 @@ def outlines(problem: Problem) -> Iterator[Shape]:
     """Curves and surfaces that the object may be touched on, in its own frame."""
     radius = OUTLINE_RADIUS * bone_length(problem)
     for contact in problem.contacts:
-        patch = contact.object
+        side = contact.sides[1]
+        patch = side.patch
         ranges = []
         for name in ("u", "v"):
-            if name in contact.frozen or name not in patch.parameters:
-                ranges.append(np.array([contact.frozen.get(name, 0.0)]))
+            if name not in side.free:
+                ranges.append(np.array([side.frozen.get(name, 0.0)]))
             else:
                 low, high = patch.interval(name) or (-np.pi, np.pi)
                 ranges.append(
@@ -98,7 +98,7 @@ def outlines(problem: Problem) -> Iterator[Shape]:
 
 
 def _sheet(grid: Array) -> Mesh:
-    """Surface through a grid of points [n, m, 3]."""
+    """Surface through a grid of points (n, m, 3)."""
     n, m = grid.shape[:2]
     i, j = (a.ravel() for a in np.meshgrid(np.arange(n - 1), np.arange(m - 1), indexing="ij"))
     a, b = i * m + j, (i + 1) * m + j

@@ -11,13 +11,11 @@ mechanisms", 2000; "Global Optimization of Robotic Grasps", Section V.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.grasps.grasps import Grasp
+from graspatlas.support.arrays import Array
 
 __all__ = ["coordinated_motions", "velocity_ellipsoid"]
-
-Array = NDArray[np.float64]
 
 #: Singular values smaller than this share of the largest count as zero.
 RANK_TOLERANCE = 1e-9
@@ -32,10 +30,10 @@ def velocity_ellipsoid(grasp: Grasp) -> tuple[Array, Array]:
         grasp: The grasp.
 
     Returns:
-        Directions of its axes as the columns of a rotation [3, 3], in the palm's frame, and its semi-axes [3], longest
+        Directions of its axes as the columns of a rotation (3, 3), in the palm's frame, and its semi-axes (3,), longest
         first, metres a radian; zero where the fingers cannot move the object.
     """
-    linear = 3 if grasp.G.shape[0] == 6 else 2
+    linear = grasp.problem.object_joint_model.translations
     A = np.zeros((3, 3))
     map_to_velocity = coordinated_motions(grasp)[0][:linear]
     A[:linear, :linear] = map_to_velocity @ map_to_velocity.T
@@ -53,11 +51,11 @@ def coordinated_motions(grasp: Grasp) -> tuple[Array, Array]:
         grasp: The grasp.
 
     Returns:
-        The object's twists [6, c] (linear, angular) and the least joint velocities that cause them [h, c]; the columns
+        The object's twists (6, c) (linear, angular) and the least joint velocities that cause them (h, c); the columns
         of the second are orthonormal. There are none where contacts leave the object loose, as two points do.
     """
     G = grasp.G.copy()
-    linear = 3 if len(G) == 6 else 2
+    linear = grasp.problem.object_joint_model.translations
     size = max(float(np.abs(grasp.J).max(initial=0.0)), 1e-12)
     G[linear:] /= size  # rotations as lengths, so that ranks do not depend on the unit of length
     if np.linalg.matrix_rank(G, tol=RANK_TOLERANCE * np.linalg.norm(G)) < len(G):

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from graspatlas.support.arrays import Array, IntArray
 from graspatlas.viewer.scene.camera import Camera
 from graspatlas.viewer.scene.meshes import Mesh
 
 __all__ = ["Subject", "best_direction"]
-
-Array = NDArray[np.float64]
 
 #: Directions that are tried: round the palm's z axis, and above its horizon [rad].
 AZIMUTHS = np.radians(np.arange(-180.0, 180.0, 12.0))
@@ -32,10 +30,10 @@ class Subject:
     """What shall be seen of one grasp, in the palm's frame.
 
     Attributes:
-        hand: Points of the hand's surface [n, 3], metres.
-        object: Points of the object's surface [m, 3].
-        object_normals: Its unit normals there [m, 3].
-        contacts: Contact points [c, 3].
+        hand: Points of the hand's surface (n, 3), metres.
+        object: Points of the object's surface (m, 3).
+        object_normals: Its unit normals there (m, 3).
+        contacts: Contact points (c, 3).
     """
 
     hand: Array
@@ -45,19 +43,19 @@ class Subject:
 
     @classmethod
     def of(cls, hand: Mesh, body: Mesh, contacts: Array) -> Subject:
-        """The subject of a hand and an object in place, and contact points [c, 3]."""
+        """The subject of a hand and an object in place, and contact points (c, 3)."""
         points, normals = _spread(body)
         return cls(_spread(hand)[0], points, normals, contacts)
 
 
 def best_direction(subjects: Sequence[Subject]) -> Array:
-    """Unit vector [3] towards the camera that sees most of the objects and of the contacts of all subjects."""
+    """Unit vector (3,) towards the camera that sees most of the objects and of the contacts of all subjects."""
     directions = [
         np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)]) for e in ELEVATIONS for a in AZIMUTHS
     ]
 
     seen = np.array([[_visible(subject, direction) for subject in subjects] for direction in directions])
-    value = (seen / np.maximum(seen.max(axis=0), 1e-12)) @ [1.0, CONTACT_WEIGHT]  # [directions, subjects]
+    value = (seen / np.maximum(seen.max(axis=0), 1e-12)) @ [1.0, CONTACT_WEIGHT]  # (directions, subjects)
     return directions[int(np.argmax(value.min(axis=1) + value.mean(axis=1)))]
 
 
@@ -69,7 +67,7 @@ def _visible(subject: Subject, direction: Array) -> tuple[float, float]:
     size = ((np.maximum(hand.max(axis=0), body.max(axis=0))[:2] - low) / CELL).astype(int) + 3
     front = np.full(size[0] * size[1], -np.inf)
 
-    def cells(points: Array) -> NDArray[np.int64]:
+    def cells(points: Array) -> IntArray:
         column, row = ((points[:, :2] - low) / CELL).astype(np.int64).T
         return np.asarray(column * size[1] + row)
 
@@ -84,7 +82,7 @@ def _visible(subject: Subject, direction: Array) -> tuple[float, float]:
 
 
 def _spread(mesh: Mesh) -> tuple[Array, Array]:
-    """Points spread evenly over a surface [SAMPLES, 3], and its unit normals there; the same ones each time."""
+    """Points spread evenly over a surface (SAMPLES, 3), and its unit normals there; the same ones each time."""
     corners = mesh.vertices[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = np.linalg.norm(normals, axis=1)

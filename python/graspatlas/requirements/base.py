@@ -1,0 +1,74 @@
+"""What asks grasps whether they meet a requirement: the base of the named ones, and any function of a grasp.
+
+A function returns True where a grasp will do, False where not, and nothing else; one that takes a whole batch of
+:class:`~graspatlas.grasps.Grasps` and returns an array (n,) of booleans is marked by :func:`graspatlas.batched`.
+Neither can write to the arrays that it gets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from graspatlas.errors import GraspAtlasError
+from graspatlas.grasps.callables import called_flags
+from graspatlas.grasps.grasps import Grasps
+from graspatlas.problem.requirement import StatedRequirement
+from graspatlas.support.arrays import Array, BoolArray
+from graspatlas.support.validation import shown
+
+__all__ = ["Requirement", "RequirementLike", "Slacks", "asked", "requirement_name"]
+
+Slacks = Callable[[Grasps], Array]
+
+
+@dataclass(frozen=True)
+class Requirement(StatedRequirement):
+    """Base of the requirements that have a name: states itself as plain data, and tells whether grasps meet it.
+
+    Attributes:
+        cost: The cheaper ones are checked first.
+    """
+
+    def met(self, grasps: Grasps) -> BoolArray:
+        """Whether each grasp meets the requirement (n,)."""
+        raise NotImplementedError
+
+    def slacks_near(self, grasp: Grasps) -> Slacks | None:
+        """By how much the requirement is met near one grasp, for optimisers; None where this is not applicable.
+
+        Args:
+            grasp: A batch of one grasp.
+
+        Returns:
+            A function of a batch of n grasps that returns (n, c) numbers of about the size of a tangent coordinate,
+            none negative where the requirement is met, as smooth as there are. What cannot matter nearby may be left
+            out.
+        """
+        return None
+
+
+#: What may be required of grasps: a named requirement, or a function of a grasp; see the top of this module.
+RequirementLike = StatedRequirement | Callable[[Any], Any]
+
+
+def requirement_name(requirement: RequirementLike | str) -> str:
+    """The requirement as text; :func:`parse_requirement` reads those of the named ones."""
+    if isinstance(requirement, StatedRequirement | str):
+        return str(requirement)
+    return getattr(requirement, "__name__", type(requirement).__name__)
+
+
+def asked(requirement: RequirementLike, grasps: Grasps) -> BoolArray:
+    """Whether each grasp meets a requirement (n,).
+
+    Raises:
+        GraspAtlasError: If a function raises or returns anything but True and False, see
+            :mod:`graspatlas.grasps.callables`; or if a requirement is stated that no class can check.
+    """
+    if isinstance(requirement, Requirement):
+        return requirement.met(grasps)
+    if isinstance(requirement, StatedRequirement):
+        raise GraspAtlasError(f"requirement {shown(str(requirement))} cannot be checked; derive it from Requirement")
+    return called_flags(requirement, requirement_name(requirement), grasps)

@@ -1,0 +1,59 @@
+"""The requirement that hand and object do not collide."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar
+
+import numpy as np
+
+from graspatlas.grasps.grasps import Grasps
+from graspatlas.problem.problem import Problem
+from graspatlas.requirements.base import Requirement, Slacks
+from graspatlas.requirements.collision import CollisionChecker
+from graspatlas.support.arrays import BoolArray
+
+__all__ = ["CollisionFree"]
+
+#: How many pairs of shapes an optimiser watches; all are checked before it takes a step.
+NEAREST_PAIRS = 12
+#: What optimisers keep beyond the clearance: distances of touching shapes have no slope [m].
+CLOSEST = 1e-5
+
+
+@dataclass(frozen=True)
+class CollisionFree(Requirement):
+    """The hand hits neither itself nor the object, the touching fingertips excepted; by coal.
+
+    Attributes:
+        touch_depth: Depth to which a touching link may sink into the object, since shapes are approximations [m].
+        clearance: Distance that all other pairs of shapes must keep [m].
+    """
+
+    touch_depth: float = 0.002
+    clearance: float = 0.0
+    name: ClassVar[str] = "collision_free"
+    cost: ClassVar[int] = 2
+
+    def __post_init__(self) -> None:
+        self._check((), ("touch_depth", "clearance"))
+
+    def met(self, grasps: Grasps) -> BoolArray:
+        """Whether each grasp meets the requirement (n,)."""
+        return self._checker(grasps.problem).free(grasps.x)
+
+    def slacks_near(self, grasp: Grasps) -> Slacks:
+        """Distances of the nearest pairs of shapes, less those asked for, in units of the problem's length scale."""
+        checker = self._checker(grasp.problem)
+        pairs = np.argsort(checker.clearances(grasp.x)[0])[:NEAREST_PAIRS]
+        return lambda grasps: (checker.clearances(grasps.x, pairs) - CLOSEST) / grasps.problem.length_scale
+
+    def _checker(self, problem: Problem) -> CollisionChecker:
+        return _checker(problem, self.touch_depth, self.clearance)
+
+
+@lru_cache(maxsize=4)
+def _checker(problem: Problem, touch_depth: float, clearance: float) -> CollisionChecker:
+    """Checkers of the last problems: reading the shapes takes longer than to check a thousand grasps."""
+    return CollisionChecker(problem, touch_depth, clearance)

@@ -1,0 +1,57 @@
+"""The requirement that friction lets the contacts hold the object."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from graspatlas import _core
+from graspatlas.errors import GraspAtlasError
+from graspatlas.grasps.grasps import Grasps
+from graspatlas.requirements.base import Requirement, Slacks
+from graspatlas.support.arrays import Array, BoolArray
+
+__all__ = ["ForceClosure"]
+
+
+@dataclass(frozen=True)
+class ForceClosure(Requirement):
+    """Friction lets the contacts resist any push: internal forces exist strictly inside all friction cones.
+
+    Attributes:
+        friction: Coefficient of friction mu at every contact.
+        margin: Smallest force-closure margin; see :func:`graspatlas.quality.force_closure_margin`. A margin of 0 asks
+            for closure alone.
+        torsional: Torsional friction [m] of soft fingers, which resist being turned about the normal by a torque of up
+            to so much times the normal force; 0 for hard fingers. With it two contacts may close.
+    """
+
+    friction: float = 0.5
+    margin: float = 0.0
+    torsional: float = 0.0
+    name: ClassVar[str] = "force_closure"
+    cost: ClassVar[int] = 1
+
+    def __post_init__(self) -> None:
+        self._check(("friction",), ("margin", "torsional"))
+        if self.torsional < 0.0:
+            raise GraspAtlasError(f"torsional of requirement {self.name} must not be negative, got {self.torsional}")
+
+    def __str__(self) -> str:
+        return f"{self.name}:{self.friction:g}:{self.margin:g}" + (f":{self.torsional:g}" if self.torsional else "")
+
+    def met(self, grasps: Grasps) -> BoolArray:
+        """Whether each grasp meets the requirement (n,)."""
+        margins = np.asarray(_core.force_closure_margins(grasps.system, grasps.x, self.friction, self.torsional))
+        return np.asarray((margins > 0.0) & (margins >= self.margin))
+
+    def slacks_near(self, grasp: Grasps) -> Slacks:
+        """The force-closure margin, negative where internal forces leave the cones, less the margin asked for."""
+
+        def slacks(grasps: Grasps) -> Array:
+            signed = np.asarray(_core.force_closure_slacks(grasps.system, grasps.x, self.friction, self.torsional))
+            return np.maximum(signed, -1.0)[:, None] - self.margin
+
+        return slacks
