@@ -2,14 +2,13 @@
 
 #include <pybind11/stl.h>
 
-#include <algorithm>
-#include <cmath>
 #include <memory>
-#include <numeric>
 #include <string>
+#include <vector>
 
 #include "bindings.hpp"
-#include "graspatlas/parallel.hpp"
+#include "graspatlas/continuation/flat_atlas.hpp"
+#include "graspatlas/errors.hpp"
 
 namespace py = pybind11;
 
@@ -17,80 +16,31 @@ namespace graspatlas {
 
 namespace {
 
-/// Where the facets, vertices and neighbours of each chart begin, when those of all charts stand one after another.
-struct Starts {
-  py::array_t<std::int64_t> facets, vertices, neighbours;
-
-  explicit Starts(const Atlas& atlas)
-      : facets(atlas.count() + 1), vertices(atlas.count() + 1), neighbours(atlas.count() + 1) {
-    std::int64_t* const f = facets.mutable_data();
-    std::int64_t* const v = vertices.mutable_data();
-    std::int64_t* const c = neighbours.mutable_data();
-    const py::gil_scoped_release release;
-    f[0] = v[0] = c[0] = 0;
-    parallel_for(atlas.threads(), atlas.count(), [&](int, std::int64_t first, std::int64_t last) {
-      for (std::int64_t i = first; i < last; ++i) {
-        const Polytope& p = atlas.chart(i).polytope;
-        f[i + 1] = 0;
-        for (int a = 0; a < p.facet_slots(); ++a) f[i + 1] += p.facet_active(a);
-        v[i + 1] = p.vertex_count();
-        c[i + 1] = atlas.chart(i).neighbour_count;
-      }
-    });
-    for (std::int64_t* starts : {f, v, c}) std::partial_sum(starts, starts + atlas.count() + 1, starts);
-  }
-};
-
 /// The whole atlas as arrays; ragged parts (facets, vertices) as values and row offsets.
 ArrayTable atlas_arrays(const Atlas& atlas) {
   const py::ssize_t n = atlas.count(), k = atlas.system().dimension(), v = atlas.system().tangent_size();
-  const py::ssize_t x_size = atlas.system().configuration_size();
-  const Starts starts(atlas);
-  const std::int64_t* const facet_start = starts.facets.data();
-  const std::int64_t* const vertex_start = starts.vertices.data();
-  const std::int64_t* const pair_start = starts.neighbours.data();
-  auto centers = matrix<double>(n, x_size);
+  py::array_t<std::int64_t> facet_start(n + 1), vertex_start(n + 1), neighbour_start(n + 1);
+  const FlatStarts starts{facet_start.mutable_data(), vertex_start.mutable_data(), neighbour_start.mutable_data()};
+  {
+    const py::gil_scoped_release release;
+    write_starts(atlas, starts);
+  }
+  auto centers = matrix<double>(n, atlas.system().configuration_size());
   auto bases = py::array_t<double>(std::vector<py::ssize_t>{n, k, v});
   auto residuals = py::array_t<double>(n), regularities = py::array_t<double>(n);
   auto nearly_singular = py::array_t<bool>(n);
-  auto normals = matrix<double>(facet_start[n], k), vertices = matrix<double>(vertex_start[n], k);
-  auto offsets = py::array_t<double>(facet_start[n]);
-  auto tags = py::array_t<std::int32_t>(facet_start[n]);
-  auto closed = py::array_t<std::uint8_t>(vertex_start[n]);
-  auto pairs = matrix<std::int32_t>(pair_start[n], 2);
-  double *center = centers.mutable_data(), *basis = bases.mutable_data(), *residual = residuals.mutable_data();
-  double* const regularity = regularities.mutable_data();
-  bool* const singular = nearly_singular.mutable_data();
-  double *normal = normals.mutable_data(), *offset = offsets.mutable_data(), *vertex = vertices.mutable_data();
-  std::int32_t *tag = tags.mutable_data(), *pair = pairs.mutable_data();
-  std::uint8_t* state = closed.mutable_data();
-  const auto copy_chart = [&](std::int64_t i) {
-    const Chart& chart = atlas.chart(i);
-    const Polytope& p = chart.polytope;
-    std::copy_n(atlas.center(i), x_size, center + i * x_size);
-    std::copy_n(atlas.basis(i), k * v, basis + i * k * v);
-    residual[i] = chart.residual;
-    regularity[i] = std::abs(chart.regularity);
-    singular[i] = chart.rank != Rank::full;
-    std::int64_t f = facet_start[i];
-    for (int a = 0; a < p.facet_slots(); ++a) {
-      if (!p.facet_active(a)) continue;
-      std::copy_n(p.normal(a), k, normal + f * k);
-      offset[f] = p.offset(a);
-      tag[f++] = p.tag(a) >= 0 ? atlas.number(p.tag(a)) : p.tag(a);
-    }
-    std::copy_n(p.vertex(0), p.vertex_count() * k, vertex + vertex_start[i] * k);
-    for (int a = 0; a < p.vertex_count(); ++a) state[vertex_start[i] + a] = p.state(a);
-    for (int c = 0; c < chart.neighbour_count; ++c) {
-      pair[2 * (pair_start[i] + c)] = atlas.number(chart.neighbours[c]);
-      pair[2 * (pair_start[i] + c) + 1] = static_cast<std::int32_t>(i);
-    }
-  };
+  auto normals = matrix<double>(starts.facets[n], k), vertices = matrix<double>(starts.vertices[n], k);
+  auto offsets = py::array_t<double>(starts.facets[n]);
+  auto tags = py::array_t<std::int32_t>(starts.facets[n]);
+  auto closed = py::array_t<std::uint8_t>(starts.vertices[n]);
+  auto pairs = matrix<std::int32_t>(starts.neighbours[n], 2);
+  const FlatAtlas flat{
+      centers.mutable_data(),         bases.mutable_data(),   residuals.mutable_data(), regularities.mutable_data(),
+      nearly_singular.mutable_data(), normals.mutable_data(), offsets.mutable_data(),   tags.mutable_data(),
+      vertices.mutable_data(),        closed.mutable_data(),  pairs.mutable_data()};
   {
     const py::gil_scoped_release release;
-    parallel_for(atlas.threads(), n, [&copy_chart](int, std::int64_t first, std::int64_t last) {
-      for (std::int64_t i = first; i < last; ++i) copy_chart(i);
-    });
+    flatten(atlas, starts, flat);
   }
   ArrayTable out;
   out["centers"] = centers;
@@ -98,11 +48,11 @@ ArrayTable atlas_arrays(const Atlas& atlas) {
   out["residuals"] = residuals;
   out["regularities"] = regularities;
   out["nearly_singular"] = nearly_singular;
-  out["facet_start"] = starts.facets;
+  out["facet_start"] = facet_start;
   out["facet_normals"] = normals;
   out["facet_offsets"] = offsets;
   out["facet_tags"] = tags;
-  out["vertex_start"] = starts.vertices;
+  out["vertex_start"] = vertex_start;
   out["vertices"] = vertices;
   out["vertex_closed"] = closed;
   out["neighbour_pairs"] = pairs;
@@ -128,7 +78,7 @@ void visit_checkpoint(Table& table, const Visit& visit) {
   visit("closed_vertices", table.closed_vertices);
   visit("closed_reasons", table.closed_reasons);
   visit("generation", table.generation);
-  visit("again", table.again);
+  visit("again", table.deferred);
 }
 
 Checkpoint read_checkpoint(const ArrayTable& table) {
@@ -139,7 +89,7 @@ Checkpoint read_checkpoint(const ArrayTable& table) {
   if (counts.size() != 7) throw Error("the checkpoint is damaged: it needs seven counts");
   out.position = counts[0];
   out.next_first = counts[1];
-  out.task_count = counts[2];
+  out.expansion_count = counts[2];
   out.audit.rounds = counts[3];
   out.audit.holes = counts[4];
   out.audit.new_first = counts[5];
@@ -159,41 +109,48 @@ ArrayTable write_checkpoint(const Checkpoint& checkpoint) {
     out[name] = py::array_t<typename std::decay_t<decltype(part)>::value_type>(static_cast<py::ssize_t>(part.size()),
                                                                                part.data());
   });
-  const std::int64_t counts[] = {checkpoint.position,     checkpoint.next_first,  checkpoint.task_count,
+  const std::int64_t counts[] = {checkpoint.position,     checkpoint.next_first,  checkpoint.expansion_count,
                                  checkpoint.audit.rounds, checkpoint.audit.holes, checkpoint.audit.new_first,
                                  checkpoint.audit.points};
   out["counts"] = py::array_t<std::int64_t>(7, counts);
   auto paused = matrix<std::int64_t>(static_cast<py::ssize_t>(checkpoint.paused.size()), 3);
   std::int64_t* numbers = paused.mutable_data();
-  for (const PausedTask& task : checkpoint.paused)
-    for (const std::int64_t number : {task.number, std::int64_t{task.turn}, std::int64_t{task.made}})
+  for (const Expansion& expansion : checkpoint.paused)
+    for (const std::int64_t number : {expansion.number, std::int64_t{expansion.index}, std::int64_t{expansion.made}})
       *numbers++ = number;
   out["paused"] = paused;
   return out;
 }
 
+/// What numbers in the atlas's arrays mean.
+void bind_codes(py::module_& module) {
+  module.def("box_half_width", &box_half_width, py::arg("dimension"), py::arg("radius"),
+             "Half the width of the box that the polytopes of charts are cut from.");
+  py::enum_<Closed>(module, "Closed", "Why a vertex of a polytope was not expanded.")
+      .value("OPEN", Closed::open)
+      .value("BOUNDS", Closed::bounds)
+      .value("CURVATURE", Closed::curvature)
+      .value("NOT_CONVERGED", Closed::not_converged)
+      .value("COVERED", Closed::covered);
+}
+
 }  // namespace
 
 void bind_atlas(py::module_& module) {
+  bind_codes(module);
   py::class_<Atlas>(module, "AtlasBuilder", "Grows an atlas chart by chart (Algorithm 1, lines 4 to 13).")
       .def(py::init([](System& system, const DoubleArray& x0, double radius, double epsilon, int threads) {
-             AtlasOptions options;
-             options.radius = radius;
-             options.epsilon = epsilon;
-             return std::make_unique<Atlas>(system, checked_vector(x0, system.configuration_size(), "x0"), options,
-                                            threads);
+             const double* const start = checked_vector(x0, system.configuration_size(), "x0");
+             return std::make_unique<Atlas>(system, start, AtlasOptions{radius, epsilon}, threads);
            }),
            py::arg("system"), py::arg("x0"), py::arg("radius"), py::arg("epsilon"), py::arg("threads") = 1,
            py::keep_alive<1, 2>())
       .def_static(
           "resume",
           [](System& system, const ArrayTable& saved, double radius, double epsilon, int threads) {
-            AtlasOptions options;
-            options.radius = radius;
-            options.epsilon = epsilon;
             const Checkpoint checkpoint = read_checkpoint(saved);
             const py::gil_scoped_release release;
-            return std::make_unique<Atlas>(system, checkpoint, options, threads);
+            return std::make_unique<Atlas>(system, checkpoint, AtlasOptions{radius, epsilon}, threads);
           },
           py::arg("system"), py::arg("saved"), py::arg("radius"), py::arg("epsilon"), py::arg("threads") = 1,
           py::keep_alive<0, 1>(), "Goes on from what `save` returned, with all charts, to the same atlas.")

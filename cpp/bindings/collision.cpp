@@ -10,7 +10,7 @@
 
 #include "bindings.hpp"
 #include "graspatlas/collision/collision_batch.hpp"
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/errors.hpp"
 #include "graspatlas/parallel.hpp"
 
 namespace py = pybind11;

@@ -11,6 +11,8 @@
 #include "graspatlas/continuation/newton.hpp"
 #include "graspatlas/continuation/polytope.hpp"
 #include "graspatlas/continuation/toy_systems.hpp"
+#include "graspatlas/errors.hpp"
+#include "graspatlas/parallel.hpp"
 
 namespace py = pybind11;
 
@@ -191,6 +193,14 @@ void bind_systems(py::module_& module) {
           },
           py::arg("x0"), py::arg("x1"), "x1 (-) x0 [tangent_size].")
       .def(
+          "same_point",
+          [](const System& s, const DoubleArray& x0, const DoubleArray& x1, double tolerance) {
+            return s.same_point(checked_vector(x0, s.configuration_size(), "x0"),
+                                checked_vector(x1, s.configuration_size(), "x1"), tolerance);
+          },
+          py::arg("x0"), py::arg("x1"), py::arg("tolerance"),
+          "True when two points are one, to within a tolerance [units of the tangent space].")
+      .def(
           "embed",
           [](const System& s, const DoubleArray& x) {
             std::vector<double> out(s.embedding_size());
@@ -228,7 +238,10 @@ void bind_systems(py::module_& module) {
 }
 
 void bind_parts(py::module_& module) {
-  py::class_<Polytope>(module, "Polytope", "A convex polytope in R^k: a box, cut by half-spaces.")
+  py::class_<Polytope> polytope(module, "Polytope", "A convex polytope in R^k: a box, cut by half-spaces.");
+  polytope.attr("BOX_TAG") = Polytope::kBoxTag;
+  polytope.def_static("bound_tag", &Polytope::bound_tag, py::arg("bound"), "Tag of the facets that a bound makes.")
+      .def_static("bound_of_tag", &Polytope::bound_of, py::arg("tag"), "The bound whose facets have a tag below -1.")
       .def(py::init<int, double>(), py::arg("dimension"), py::arg("half_width"))
       .def(
           "cut",
@@ -274,6 +287,7 @@ void bind_parts(py::module_& module) {
 void bind_continuation(py::module_& module) {
   bind_systems(module);
   bind_parts(module);
+  module.def("available_threads", &available_threads, "Cores that this process may use.");
   module.def(
       "project",
       [](System& system, const DoubleArray& x, const DoubleArray& Phi, const DoubleArray& u) {
@@ -287,7 +301,7 @@ void bind_continuation(py::module_& module) {
           for (int c = 0; c < n; ++c) step[c] += coordinates[a] * Phi.data()[static_cast<py::ssize_t>(a) * n + c];
         system.integrate(center, step.data(), out.data());
         const Lease own(system);
-        Newton newton(*own, NewtonOptions());
+        Newton newton(*own);
         if (newton.project(out.data(), Phi.data()) != Projection::converged) return py::object(py::none());
         return py::object(vector(out));
       },

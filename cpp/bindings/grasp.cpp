@@ -8,6 +8,7 @@
 
 #include "bindings.hpp"
 #include "graspatlas/continuation/lease.hpp"
+#include "graspatlas/errors.hpp"
 #include "graspatlas/grasp/bspline_patch.hpp"
 #include "graspatlas/grasp/derived_patch.hpp"
 #include "graspatlas/grasp/grasp_system.hpp"
@@ -31,17 +32,6 @@ Eigen::Matrix4d matrix_from(const Placement& placement) {
   T.topLeftCorner<3, 3>() = placement.rotation;
   T.topRightCorner<3, 1>() = placement.translation;
   return T;
-}
-
-ObjectJoint object_joint_from(const std::string& name) {
-  if (name == "free_flyer") return ObjectJoint::free_flyer;
-  if (name == "planar") return ObjectJoint::planar;
-  if (name == "none") return ObjectJoint::none;
-  throw Error("the object's joint is 'free_flyer', 'planar' or 'none', not '" + name + "'");
-}
-
-const char* name_of(ObjectJoint joint) {
-  return joint == ObjectJoint::free_flyer ? "free_flyer" : joint == ObjectJoint::planar ? "planar" : "none";
 }
 
 ParameterUnit unit_from(const std::string& name) {
@@ -74,12 +64,12 @@ ArrayTable grasp_arrays(GraspSystem& shared, const DoubleArray& X) {
   const Lease own(shared);
   GraspSystem& system = *own;
   const py::ssize_t n = checked_rows(system, X), m = system.contact_count(), dof = system.object_dof();
-  const py::ssize_t drives = system.drive_count();
+  const py::ssize_t actuated = system.actuated_count();
   Stack hand_points = stack({n, m, 3}), object_points = stack({n, m, 3}), hand_normals = stack({n, m, 3}),
-        object_normals = stack({n, m, 3}), J = stack({n, 3 * m, drives}), G = stack({n, dof, 3 * m}),
+        object_normals = stack({n, m, 3}), J = stack({n, 3 * m, actuated}), G = stack({n, dof, 3 * m}),
         T = stack({n, 4, 4});
   std::vector<ContactPoint> contacts(m);
-  RowMatrix J_one(3 * m, drives), Gt_one(3 * m, dof);
+  RowMatrix J_one(3 * m, actuated), Gt_one(3 * m, dof);
   using Map3 = Eigen::Map<Eigen::Vector3d>;
   for (py::ssize_t i = 0; i < n; ++i) {
     if (i % kGraspsBetweenSignals == kGraspsBetweenSignals - 1 && PyErr_CheckSignals() != 0)
@@ -92,13 +82,13 @@ ArrayTable grasp_arrays(GraspSystem& shared, const DoubleArray& X) {
       Map3(hand_normals.mutable_data(i, c, 0)) = contacts[c].hand_normal;
       Map3(object_normals.mutable_data(i, c, 0)) = contacts[c].object_normal;
     }
-    const int joint = system.model().object_joint();
+    const int joint = system.model().object_joint_index();
     using Row4 = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
     Eigen::Map<Row4>(T.mutable_data(i, 0, 0)) =
         joint < 0 ? Eigen::Matrix4d::Identity() : matrix_from(system.model().placement(joint));
     if (dof == 0) continue;
     system.grasp_matrices(x, J_one, Gt_one);
-    Eigen::Map<RowMatrix>(J.mutable_data(i, 0, 0), 3 * m, drives) = J_one;
+    Eigen::Map<RowMatrix>(J.mutable_data(i, 0, 0), 3 * m, actuated) = J_one;
     Eigen::Map<RowMatrix>(G.mutable_data(i, 0, 0), dof, 3 * m) = Gt_one.transpose();
   }
   ArrayTable out;
@@ -122,11 +112,11 @@ void bind_model(py::module_& module) {
       .def_readonly("prismatic", &JointInfo::prismatic);
   py::class_<Model, py::smart_holder>(module, "Model", "Hand and object as one kinematic tree.")
       .def(py::init([](const std::string& urdf, const std::string& object) {
-             return std::make_unique<Model>(urdf, object_joint_from(object));
+             return std::make_unique<Model>(urdf, ObjectJoint::from_name(object));
            }),
            py::arg("urdf"), py::arg("object_joint"))
       .def("__reduce__",
-           by_arguments<Model>([](const Model& m) { return py::make_tuple(m.urdf(), name_of(m.object_kind())); }))
+           by_arguments<Model>([](const Model& m) { return py::make_tuple(m.urdf(), m.object_joint().name()); }))
       .def_property_readonly("q_size", &Model::q_size, "Numbers in q.")
       .def_property_readonly("v_size", &Model::v_size, "Numbers in a velocity.")
       .def_property_readonly("hand_q_size", &Model::hand_q_size, "Numbers in the hand's part of q.")
@@ -144,7 +134,8 @@ void bind_model(py::module_& module) {
             return out;
           },
           "Frame name -> (joint, placement of the frame in the joint [4 x 4]).")
-      .def_property_readonly("object_joint", &Model::object_joint, "Joint that carries the object; -1 without one.")
+      .def_property_readonly("object_joint", &Model::object_joint_index,
+                             "Joint that carries the object; -1 without one.")
       .def(
           "frame_placements",
           [](Model& model, const DoubleArray& q) {
@@ -254,7 +245,7 @@ py::tuple arguments_of(const GraspSystem& system) {
   py::list sides;
   for (const Contact& contact : system.contacts()) sides.append(py::make_tuple(contact.hand, contact.object));
   return py::make_tuple(std::make_shared<Model>(system.model()), sides, Matrix(system.motions()), system.length_scale(),
-                        system.lower_limits(), system.upper_limits(), Matrix(system.drives()));
+                        system.lower_limits(), system.upper_limits(), Matrix(system.transmission()));
 }
 
 }  // namespace
@@ -267,16 +258,17 @@ void bind_grasp(py::module_& module) {
       .def(py::init([](const std::shared_ptr<Model>& model,
                        const std::vector<std::pair<ContactSide, ContactSide>>& sides, const Matrix& motions,
                        double length_scale, const std::vector<double>& lower, const std::vector<double>& upper,
-                       const std::optional<Matrix>& drives) {
+                       const std::optional<Matrix>& transmission) {
              std::vector<Contact> contacts;
              for (const auto& [hand, object] : sides) contacts.push_back({hand, object});
              const int h = model->hand_v_size();
              // A model of its own: Python may use the other at any time.
-             return std::make_unique<GraspSystem>(std::make_shared<Model>(*model), std::move(contacts), motions,
-                                                  length_scale, lower, upper, drives.value_or(Matrix::Identity(h, h)));
+             return std::make_unique<GraspSystem>(GraspParts{std::make_shared<Model>(*model), std::move(contacts),
+                                                             motions, length_scale, lower, upper,
+                                                             transmission.value_or(Matrix::Identity(h, h))});
            }),
            py::arg("model"), py::arg("contacts"), py::arg("motions"), py::arg("length_scale"), py::arg("lower"),
-           py::arg("upper"), py::arg("drives") = py::none())
+           py::arg("upper"), py::arg("transmission") = py::none())
       .def("__reduce__", by_arguments<GraspSystem>(arguments_of))
       .def_property_readonly("n_contacts", &GraspSystem::contact_count, "Number of contacts.")
       .def_property_readonly("n_parameters", &GraspSystem::parameter_count, "Free patch parameters.")

@@ -1,7 +1,7 @@
 #include <string>
 
 #include "bindings.hpp"
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/errors.hpp"
 
 namespace graspatlas {
 

@@ -1,13 +1,11 @@
-#include <atomic>
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "bindings.hpp"
-#include "graspatlas/continuation/lease.hpp"
-#include "graspatlas/parallel.hpp"
+#include "graspatlas/errors.hpp"
+#include "graspatlas/quality/batch.hpp"
 #include "graspatlas/quality/force_closure.hpp"
 #include "graspatlas/quality/manipulability.hpp"
 #include "graspatlas/quality/min_weight.hpp"
@@ -37,61 +35,37 @@ void check_wrenches(const DoubleArray& wrenches) {
     if (!std::isfinite(wrenches.data()[i])) throw Error("wrenches must be finite numbers");
 }
 
-constexpr std::chrono::milliseconds kBetweenSignals{50};  // so that Ctrl-C is heard
-constexpr py::ssize_t kRowsForThreads = 256;              // fewer rows are done before other threads have started
-
-/// evaluate(row) for n rows, without the GIL, on all cores. Each worker has what `make(worker)` returns.
-template <class Make>
-void for_rows(py::ssize_t n, const Make& make) {
-  const int threads = n < kRowsForThreads ? 1 : available_threads();
-  std::vector<decltype(make(0))> evaluate;
-  for (int worker = 0; worker < threads; ++worker) evaluate.push_back(make(worker));
-  std::atomic<bool> interrupted{false};
-  auto heard = std::chrono::steady_clock::now();  // by the first worker
-  py::gil_scoped_release release;
-  parallel_for(threads, n, [&](int worker, std::int64_t first, std::int64_t last) {
-    for (std::int64_t row = first; row < last && !interrupted; ++row) {
-      evaluate[static_cast<std::size_t>(worker)](row);
-      if (worker == 0 && std::chrono::steady_clock::now() - heard > kBetweenSignals) {
-        py::gil_scoped_acquire acquire;
-        if (PyErr_CheckSignals() != 0) interrupted = true;
-        heard = std::chrono::steady_clock::now();
-      }
-    }
-  });
-  if (interrupted) {
-    py::gil_scoped_acquire acquire;
-    throw py::error_already_set();
+/// Work on rows without the GIL: work(on) is false when on() was, that is after Ctrl-C.
+template <class Work>
+void interruptible(const Work& work) {
+  const auto on = [] {
+    const py::gil_scoped_acquire acquire;
+    return PyErr_CheckSignals() == 0;
+  };
+  bool done = false;
+  {
+    const py::gil_scoped_release release;
+    done = work(on);
   }
+  if (!done) throw py::error_already_set();
 }
 
-/// One number for each of n rows; see for_rows.
+/// One number for each of n rows; see batch.hpp.
 template <class Make>
-py::array_t<double> evaluate_rows(py::ssize_t n, const Make& make) {
+py::array_t<double> numbers_of_rows(py::ssize_t n, const Make& make) {
   py::array_t<double> out(n);
   double* values = out.mutable_data();
-  for_rows(n, [&make, values](int worker) {
-    return [evaluate = make(worker), values](std::int64_t row) mutable { values[row] = evaluate(row); };
-  });
+  interruptible([&](const auto& on) { return evaluate_rows(n, make, values, on); });
   return out;
 }
-
-/// A measure of grasps with a system of its own to read them from, for one worker.
-template <class Measure>
-struct Own {
-  template <class... Arguments>
-  explicit Own(GraspSystem& shared, Arguments... arguments) : system(shared), measure(*system, arguments...) {}
-  Lease<GraspSystem> system;
-  Measure measure;
-};
 
 /// closure.`measure`(x) for each row of X.
 py::array_t<double> evaluate_closure(GraspSystem& system, const DoubleArray& X, double friction, double torsional,
                                      double (ForceClosure::*measure)(const double*)) {
   const double* x = X.data();
   const int size = system.configuration_size();
-  return evaluate_rows(checked_rows(system, X), [&system, x, size, friction, torsional, measure](int) {
-    auto own = std::make_shared<Own<ForceClosure>>(system, friction, torsional);
+  return numbers_of_rows(checked_rows(system, X), [&system, x, size, friction, torsional, measure](int) {
+    auto own = std::make_shared<OwnMeasure<ForceClosure>>(system, friction, torsional);
     return [own, x, size, measure](std::int64_t row) { return (own->measure.*measure)(x + row * size); };
   });
 }
@@ -102,7 +76,7 @@ py::array_t<double> measure_hulls(const DoubleArray& wrenches, Measure measure) 
   using Points = typename WrenchHull<D>::Points;
   const double* data = wrenches.data();
   const py::ssize_t count = wrenches.shape(1);
-  return evaluate_rows(wrenches.shape(0), [measure, data, count](int) {
+  return numbers_of_rows(wrenches.shape(0), [measure, data, count](int) {
     return [hull = std::make_shared<WrenchHull<D>>(), measure, data, count](std::int64_t row) {
       return measure(*hull, Eigen::Map<const Points>(data + row * count * D, D, count));
     };
@@ -149,7 +123,7 @@ void bind_wrenches(py::module_& module) {
         check_wrenches(wrenches);
         const double* data = wrenches.data();
         const py::ssize_t count = wrenches.shape(1), components = wrenches.shape(2);
-        return evaluate_rows(wrenches.shape(0), [data, count, components](int) {
+        return numbers_of_rows(wrenches.shape(0), [data, count, components](int) {
           return [weight = std::make_shared<MinWeight>(), data, count, components](std::int64_t row) {
             return weight->normalized(Eigen::Map<const RowMatrix>(data + row * count * components, count, components));
           };
@@ -170,11 +144,12 @@ void bind_quality(py::module_& module) {
         const double* x = X.data();
         double* axes = out.mutable_data();
         const int size = system.configuration_size();
-        for_rows(n, [&system, x, axes, dof, size, length_unit](int) {
-          auto own = std::make_shared<Own<Manipulability>>(system, length_unit);
+        const auto make = [&system, x, axes, dof, size, length_unit](int) {
+          auto own = std::make_shared<OwnMeasure<Manipulability>>(system, length_unit);
           return
               [own, x, axes, dof, size](std::int64_t row) { own->measure.semi_axes(x + row * size, axes + row * dof); };
-        });
+        };
+        interruptible([&](const auto& on) { return for_rows(n, make, on); });
         return out;
       },
       py::arg("system"), py::arg("X"), py::arg("length_unit"),

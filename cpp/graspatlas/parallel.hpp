@@ -6,26 +6,26 @@
 
 namespace graspatlas {
 
-/// What a thread does between two looks at something that mostly changes within a microsecond: at first nothing, after
-/// some looks it lets others run.
-class Patience {
+/// What a thread does between two looks at something that mostly changes within a microsecond: at first it pauses,
+/// after some looks it lets others run.
+class SpinWait {
  public:
   void wait() {
-    if (looks_++ < kShort)
+    if (waits_++ < kPauses)
       pause();
     else
       std::this_thread::yield();
   }
 
  private:
-  static constexpr int kShort = 64;
+  static constexpr int kPauses = 64;
 
   static void pause() {
 #if defined(__x86_64__)
     __builtin_ia32_pause();
 #endif
   }
-  int looks_ = 0;
+  int waits_ = 0;
 };
 
 /// Cores that this process may use.

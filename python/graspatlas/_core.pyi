@@ -13,6 +13,7 @@ __all__: list[str] = [
     "AnySystem",
     "AtlasBuilder",
     "BSplinePatch",
+    "Closed",
     "CollisionBatch",
     "ContactSide",
     "CurvePatch",
@@ -33,7 +34,9 @@ __all__: list[str] = [
     "Sphere",
     "Torus",
     "TorusPatch",
+    "available_threads",
     "ball_radii",
+    "box_half_width",
     "distances_from_hull",
     "force_closure_margins",
     "force_closure_slacks",
@@ -84,6 +87,15 @@ class AnySystem:
     ) -> numpy.typing.NDArray[numpy.float64]:
         """
         x (+) v [configuration_size].
+        """
+    def same_point(
+        self,
+        x0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        x1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        tolerance: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> bool:
+        """
+        True when two points are one, to within a tolerance [units of the tangent space].
         """
     def slack(self, x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -164,6 +176,18 @@ class Polytope:
     """
     A convex polytope in R^k: a box, cut by half-spaces.
     """
+
+    BOX_TAG: typing.ClassVar[int] = -1
+    @staticmethod
+    def bound_of_tag(tag: typing.SupportsInt | typing.SupportsIndex) -> int:
+        """
+        The bound whose facets have a tag below -1.
+        """
+    @staticmethod
+    def bound_tag(bound: typing.SupportsInt | typing.SupportsIndex) -> int:
+        """
+        Tag of the facets that a bound makes.
+        """
     def __init__(
         self,
         dimension: typing.SupportsInt | typing.SupportsIndex,
@@ -209,6 +233,50 @@ class Neighbours:
         """
         Numbers of the points within a distance, ascending.
         """
+
+class Closed:
+    """
+    Why a vertex of a polytope was not expanded.
+
+    Members:
+
+      OPEN
+
+      BOUNDS
+
+      CURVATURE
+
+      NOT_CONVERGED
+
+      COVERED
+    """
+
+    BOUNDS: typing.ClassVar[Closed]
+    COVERED: typing.ClassVar[Closed]
+    CURVATURE: typing.ClassVar[Closed]
+    NOT_CONVERGED: typing.ClassVar[Closed]
+    OPEN: typing.ClassVar[Closed]
+    __members__: typing.ClassVar[dict[str, Closed]]
+    @typing.overload
+    def __eq__(self, other: Closed) -> bool: ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool: ...
+    def __getstate__(self) -> int: ...
+    def __hash__(self) -> int: ...
+    def __index__(self) -> int: ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def __int__(self) -> int: ...
+    @typing.overload
+    def __ne__(self, other: Closed) -> bool: ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool: ...
+    def __repr__(self) -> str: ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def __str__(self) -> str: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
 
 class AtlasBuilder:
     """
@@ -520,7 +588,7 @@ class GraspSystem(AnySystem):
         length_scale: typing.SupportsFloat | typing.SupportsIndex,
         lower: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
         upper: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-        drives: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] | None = None,
+        transmission: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] | None = None,
     ) -> None: ...
     def __reduce__(self) -> tuple[typing.Any, ...]: ...
     def grasp_arrays(
@@ -607,11 +675,23 @@ class CollisionBatch:
         Distance of each point [palm] from the nearest of some shapes [n x points].
         """
 
+def available_threads() -> int:
+    """
+    Cores that this process may use.
+    """
+
 def ball_radii(
     wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Radius of the largest ball around the origin in the hull of each grasp's wrenches [n x points x 3 or 6]; see wrench_hull.hpp.
+    """
+
+def box_half_width(
+    dimension: typing.SupportsInt | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex
+) -> float:
+    """
+    Half the width of the box that the polytopes of charts are cut from.
     """
 
 def distances_from_hull(

@@ -69,7 +69,7 @@ std::shared_ptr<const CollisionScene> scene_of(int shapes_a_link, double require
   for (const LinkShape& shape : read_collision_shapes(urdf, urdf, {})) shapes.push_back(shape);
   const int in_hand = static_cast<int>(shapes.size());
   require(in_hand == shapes_a_link * (kJoints + 1), "all shapes of the URDF are read");
-  for (const CollisionShape& shape : object_shapes(model.object_joint())) shapes.push_back(shape);
+  for (const CollisionShape& shape : object_shapes(model.object_joint_index())) shapes.push_back(shape);
   std::vector<CollisionPair> pairs;
   for (int i = 0; i < in_hand; ++i)
     for (int j = i + 1; j < static_cast<int>(shapes.size()); ++j)
@@ -141,7 +141,7 @@ void wrong_scenes() {
   const std::string urdf = chain_urdf(1);
   const Model model(urdf, ObjectJoint::free_flyer);
   const auto refused = [&](auto change, std::vector<CollisionPair> pairs, const char* part) {
-    auto shapes = object_shapes(model.object_joint());
+    auto shapes = object_shapes(model.object_joint_index());
     change(shapes);
     refuse([&] { CollisionScene(model, shapes, pairs); }, part);
   };

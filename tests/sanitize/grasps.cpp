@@ -77,7 +77,7 @@ Tripod tripod(int kept, double length_scale) {
     tip.rotation.col(2) = tip.rotation.col(0).cross(tip.rotation.col(1));
     tip.translation = frame.placement.translation;
     const ContactSide hand = {frame.joint, tip, std::make_shared<PlanePatch>(Placement{}), {}, {}};
-    const int object = model->object_joint();
+    const int object = model->object_joint_index();
     const auto plane = [](const Placement& at) { return std::make_shared<PlanePatch>(at); };
     const auto turned = [&](const Placement& at) {
       Eigen::Matrix<double, Eigen::Dynamic, 4> outline(2, 4);
@@ -96,8 +96,8 @@ Tripod tripod(int kept, double length_scale) {
   motions = Eigen::HouseholderQR<Matrix>(motions).householderQ() * Matrix::Identity(9, kept);
   if (kept == 9) motions.setIdentity();
   const auto lower = model->lower_limits(), upper = model->upper_limits();
-  return {std::make_shared<GraspSystem>(model, contacts, motions, length_scale, lower, upper, Matrix::Identity(9, 9)),
-          x1};
+  const GraspParts parts{model, contacts, motions, length_scale, lower, upper, Matrix::Identity(9, 9)};
+  return {std::make_shared<GraspSystem>(parts), x1};
 }
 
 // Central differences of the residual against the Jacobian.
@@ -178,14 +178,20 @@ void wrong_systems() {
   auto model = std::make_shared<Model>(hand_urdf("revolute"), ObjectJoint::free_flyer);
   const auto lower = model->lower_limits(), upper = model->upper_limits();
   const Matrix all = Matrix::Identity(9, 9);
-  refuse([&] { GraspSystem(model, {}, Matrix::Identity(8, 8), 0.01, lower, upper, all); }, "rows");
-  refuse([&] { GraspSystem(model, {}, all, 0.01, lower, upper, Matrix::Identity(8, 8)); }, "drives");
-  refuse([&] { GraspSystem(model, {}, all, 0.0, lower, upper, all); }, "length_scale");
-  refuse([&] { GraspSystem(model, {}, all, 0.01, {0.0}, upper, all); }, "limits");
-  refuse([&] { GraspSystem(model, {}, all, 0.01, upper, lower, all); }, "limits");
+  const GraspParts sound{model, {}, all, 0.01, lower, upper, all};
+  const auto refuse_with = [&](const char* message, const auto& spoil) {
+    GraspParts parts = sound;
+    spoil(parts);
+    refuse([&] { GraspSystem{parts}; }, message);
+  };
+  refuse_with("rows", [](GraspParts& parts) { parts.motions = Matrix::Identity(8, 8); });
+  refuse_with("transmission", [](GraspParts& parts) { parts.transmission = Matrix::Identity(8, 8); });
+  refuse_with("length_scale", [](GraspParts& parts) { parts.length_scale = 0.0; });
+  refuse_with("limits", [](GraspParts& parts) { parts.lower = {0.0}; });
+  refuse_with("limits", [](GraspParts& parts) { std::swap(parts.lower, parts.upper); });
   const ContactSide nowhere = {99, {}, std::make_shared<PlanePatch>(Placement{}), {}, {}};
-  refuse([&] { GraspSystem(model, {{nowhere, nowhere}}, all, 0.01, lower, upper, all); }, "joint 99");
-  GraspSystem free(model, {}, all, 0.01, lower, upper, all);
+  refuse_with("joint 99", [&](GraspParts& parts) { parts.contacts = {{nowhere, nowhere}}; });
+  GraspSystem free(sound);
   refuse([&] { Manipulability(free, 1e-3); }, "contact");
   refuse([&] { ForceClosure(free, 0.5, 0.0); }, "contact");
   const Tripod made = tripod(9, 0.01);

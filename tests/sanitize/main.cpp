@@ -9,8 +9,8 @@
 int main() {
   using Part = std::pair<const char*, void (*)()>;
   const Part parts[] = {
-      {"polytopes", strain::polytopes}, {"neighbours", strain::neighbours}, {"atlases", strain::atlases},
-      {"misuse", strain::misuse},       {"users", strain::users},
+      {"polytopes", strain::polytopes}, {"neighbours", strain::neighbours}, {"fronts", strain::fronts},
+      {"atlases", strain::atlases},     {"misuse", strain::misuse},         {"users", strain::users},
 #ifdef GRASPATLAS_WITH_GRASPS
       {"grasps", strain::grasps},       {"collisions", strain::collisions},
 #endif

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/errors.hpp"
 #include "graspatlas/parallel.hpp"
 
 /// What the parts of the sanitizer program share. A sanitizer ends the program at the first fault; a wrong answer ends
@@ -64,6 +64,7 @@ class Random {
 
 void atlases();
 void collisions();
+void fronts();
 void grasps();
 void misuse();
 void neighbours();

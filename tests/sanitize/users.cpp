@@ -54,7 +54,7 @@ std::vector<double> project(System& system, unsigned seed) {
     std::vector<double> x = random.direction(3);
     for (double& c : x) c *= 1.05;
     const Lease own(system);
-    Newton newton(*own, NewtonOptions());
+    Newton newton(*own);
     require(newton.project_freely(x.data(), Phi.data()) == Projection::converged,
             "a point near the sphere is projected");
     out.insert(out.end(), x.begin(), x.end());

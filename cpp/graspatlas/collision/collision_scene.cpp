@@ -9,7 +9,7 @@
 #include <cmath>
 #include <limits>
 
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/errors.hpp"
 #include "graspatlas/parallel.hpp"
 
 namespace graspatlas {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "graspatlas/grasp/patch.hpp"
+#include "graspatlas/grasp/placement.hpp"
 
 namespace graspatlas {
 

@@ -8,7 +8,7 @@
 #include <pinocchio/parsers/urdf.hpp>
 
 #include "graspatlas/collision/collision_shape.hpp"
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/errors.hpp"
 
 namespace graspatlas {
 

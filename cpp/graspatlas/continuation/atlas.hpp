@@ -1,19 +1,18 @@
 #pragma once
 
-#include <array>
-#include <atomic>
-#include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <vector>
 
+#include "graspatlas/continuation/audit_round.hpp"
 #include "graspatlas/continuation/auditor.hpp"
 #include "graspatlas/continuation/charts.hpp"
 #include "graspatlas/continuation/checkpoint.hpp"
 #include "graspatlas/continuation/expander.hpp"
+#include "graspatlas/continuation/front.hpp"
+#include "graspatlas/continuation/options.hpp"
 #include "graspatlas/continuation/system.hpp"
+#include "graspatlas/continuation/task_window.hpp"
 
 namespace graspatlas {
 
@@ -24,16 +23,10 @@ namespace graspatlas {
 /// agree to 1 - epsilon; and each polytope lies in the half-space nearer to its own centre than to the other's, both
 /// seen in its own tangent space.
 ///
-/// The charts that are open at one time are a generation; the charts made from them are the next. A small generation is
-/// expanded in its own order; in a large one charts are taken from several parts of the front in turn. Threads look at
-/// a window of this order, and take the first chart that is far enough (kIndependent) from all before it that are not
-/// done: then the two leave each other's charts alone. So the atlas is the one that a single thread would make, to the
-/// bit.
+/// Its charts lie in `Charts`, `Front` says which are to be expanded next, and `TaskWindow` hands them out to threads,
+/// each of which has an Expander, such that the atlas is the one that a single thread would make, to the bit.
 class Atlas {
  public:
-  /// Charts that one task may make: a chart with more to make comes again in the next generation.
-  static constexpr int kMostCharts = 64;
-
   /// Starts with one chart at the point of the manifold nearest x0.
   /// Throws when x0 cannot be projected, breaks a bound, or the Jacobian there is rank deficient.
   /// A system that cannot be cloned is left to one thread.
@@ -49,10 +42,10 @@ class Atlas {
 
   bool complete() const { return open_count() == 0; }
   /// Charts that were not expanded yet.
-  std::int64_t open_count() const;
-  std::int64_t count() const { return static_cast<std::int64_t>(order_.size()); }
-  /// Charts, the first ones, whose numbers stay: of those after them some may get others when tasks go on.
-  std::int64_t settled_count() const { return settled_; }
+  std::int64_t open_count() const { return front_.open_count(); }
+  std::int64_t count() const { return front_.count(); }
+  /// Charts, the first ones, whose numbers stay: of those after them some may get others when expansions go on.
+  std::int64_t settled_count() const { return front_.settled_count(); }
   int threads() const { return static_cast<int>(workers_.size()); }
 
   /// Look, for so many seconds, for points of the manifold that a complete atlas does not cover: by at least so many
@@ -64,10 +57,10 @@ class Atlas {
   bool audited() const { return complete() && audit_.done; }
   const AuditState& audit_state() const { return audit_; }
 
-  const double* center(std::int64_t i) const { return charts_.center(order_[i]); }
-  const double* basis(std::int64_t i) const { return charts_.basis(order_[i]); }
+  const double* center(std::int64_t i) const { return charts_.center(front_.slot(i)); }
+  const double* basis(std::int64_t i) const { return charts_.basis(front_.slot(i)); }
   /// Its facets and neighbours name slots; `number` tells which charts these are.
-  const Chart& chart(std::int64_t i) const { return charts_[order_[i]]; }
+  const Chart& chart(std::int64_t i) const { return charts_[front_.slot(i)]; }
   int number(int slot) const { return charts_[slot].number; }
 
   /// Newton projections made so far, those of failed attempts included.
@@ -80,87 +73,30 @@ class Atlas {
   const System& system() const { return system_; }
 
  private:
-  static constexpr int kWindow = 32;
-
+  /// What belongs to one thread.
   struct Worker {
     std::unique_ptr<System> system;  // its own, if the system has a clone
     std::unique_ptr<Expander> expander;
-    std::unique_ptr<Auditor> auditor;
+    std::unique_ptr<Auditor> auditor;  // made for the first audit
   };
-  /// A place that an audit looks at, and what it finds there.
-  struct Look {
-    enum class Kind { rank, closed_vertex, behind_bounds, walk, along_bound } kind;
-    int slot, vertex;
-    std::uint64_t seed;
-    int points = 0;
-    bool loses_rank = false;
-    Closed reason = Closed::open;
-    std::vector<Hole> holes = {};
-  };
-  /// A chart to expand.
-  struct Task {
-    std::int64_t number;   // in the order of the algorithm; 0: this place in the window is free
-    int turn;              // the chart's place in the generation
-    int made, most;        // charts that it has made, and how many it may make in all
-    std::uint32_t before;  // places in the window of those that must be done first
-    bool running;
-  };
-  using Lock = std::unique_lock<std::mutex>;
 
   /// With work space for its threads, and no chart.
   Atlas(System& system, const AtlasOptions& options, int threads);
-  void restore(const Checkpoint& saved);
-  void work(Worker& worker);
-  Task* take_task(Worker& worker);
-  Task* first_free_task();
-  void admit_task(std::int64_t most);
-  bool has_next() const { return !paused_.empty() || position_ < turns_.size(); }
-  bool may_admit() const;
-  const double* embedding(int turn) const;
-  void finish_task(Worker& worker, Task& task, int made, bool done);
-  void pause(const Task& task, int made);
-  void free_place(Task& task);
-  void stop_after_error();
-  void stop();
-  bool next_generation(Worker& worker);
-  void choose_order(Worker& worker);
-  void settle_order();
-  void begin_round(std::int64_t points);
-  void add_walks(std::int64_t points, const std::vector<int>& at_bounds);
-  void look(Auditor& auditor, Look& at) const;
+  void work(int worker);
+  std::vector<Auditor*> auditors();
   void end_round();
-  bool add_holes();
-  void wait(Lock& lock);
-  bool tiny() const;
+  bool begin_charts_at_holes();
+  void put_back_charts(const Checkpoint& saved);
+  void put_back_closed_vertices(const Checkpoint& saved);
 
   System& system_;
   AtlasOptions options_;
   Charts charts_;
-  std::vector<std::unique_ptr<Worker>> workers_;
-  std::vector<int> order_;      // slots in the order of the algorithm
-  std::ptrdiff_t settled_ = 0;  // charts of it whose numbers stay
-
-  std::vector<int> generation_, turns_;  // slots of the charts to expand, and the order to take them in
-  std::vector<double> embeddings_;       // of the charts of the generation
-  std::size_t position_ = 0;             // in turns_
-  std::size_t next_first_ = 0;           // in order_: where the next generation begins
-  std::vector<int> again_;               // charts that made as many as one task may, or were opened again
-  std::vector<PausedTask> paused_;       // tasks that time or the limit of charts cut short; they go on first
-  std::int64_t task_count_ = 0;
-
+  std::vector<Worker> workers_;
+  Front front_;
+  TaskWindow window_;
   AuditState audit_;
-  std::vector<Look> looks_;  // of the round of the audit that is going on
-  std::size_t next_look_ = 0;
-
-  // State of one call of expand, guarded by mutex_.
-  std::mutex mutex_;
-  std::condition_variable changed_, helpers_wanted_;
-  std::int64_t chart_limit_ = 0, made_ = 0, promised_ = 0;  // charts that tasks have made, and may still make
-  std::array<Task, kWindow> window_;                        // tasks that are running, or may be next
-  int admitted_ = 0;                                        // tasks in the window
-  bool stop_ = false;                                       // no more are admitted
-  std::atomic<std::int64_t> events_{0};                     // changes that a thread may wait for
-  Clock::time_point deadline_;
+  std::unique_ptr<AuditRound> round_;  // of the audit, if one is going on
 };
 
 }  // namespace graspatlas

@@ -5,43 +5,12 @@
 #include <shared_mutex>
 #include <vector>
 
+#include "graspatlas/continuation/chart.hpp"
 #include "graspatlas/continuation/neighbours.hpp"
-#include "graspatlas/continuation/newton.hpp"
-#include "graspatlas/continuation/polytope.hpp"
 #include "graspatlas/continuation/rows.hpp"
-#include "graspatlas/continuation/system.hpp"
 #include "graspatlas/parallel.hpp"
 
 namespace graspatlas {
-
-struct AtlasOptions {
-  double radius = 0.1;   ///< r: radius of the ball that a chart may cover [units of the tangent space]
-  double epsilon = 0.1;  ///< eqs (17) and (18): how far and how different neighbouring charts may be
-  NewtonOptions newton;
-  double shrink = 0.9;          ///< alpha is multiplied by this after each failed attempt (Algorithm 1, line 11)
-  double smallest_step = 0.05;  ///< a vertex is closed when alpha falls below this share of the radius
-};
-
-/// Place of a chart in its atlas in the order of the algorithm, as far as it is known.
-using ChartKey = std::uint64_t;
-
-/// Whether the Jacobian loses rank within a chart: it may by what neighbours say, to first order, or does.
-enum class Rank : std::uint8_t { full, doubtful, lost };
-
-struct Chart {
-  Polytope polytope;                ///< facets are tagged by the slots of the charts behind them
-  const int* neighbours = nullptr;  ///< slots of the neighbours older than the chart itself
-  int neighbour_count = 0;
-  bool done = false;      ///< no vertex was left to expand when it was expanded
-  bool closed = false;    ///< vertices of it were closed
-  int number = -1;        ///< in the order of the algorithm; -1 until that is settled
-  ChartKey key = 0;       ///< ascends in the order of the algorithm
-  double residual = 0.0;  ///< largest entry of |R| at the centre
-  /// Newton::regularity at the centre: its size tells how near the Jacobian is to losing rank, and where its sign is
-  /// another than a neighbour's, beside the orientations of their bases, it has lost it between the two.
-  double regularity = 1.0;
-  Rank rank = Rank::full;
-};
 
 /// The charts of an atlas as several threads make them: each has a slot, a number that means nothing.
 ///
@@ -70,14 +39,14 @@ class Charts {
 
   /// From now on `near` finds the chart, by its embedding.
   void publish(int slot, const double* embedding) {
-    for (Patience patience; !indexing_.try_lock();) patience.wait();
+    for (SpinWait spin; !indexing_.try_lock();) spin.wait();
     const std::lock_guard lock(indexing_, std::adopt_lock);
     index_.insert(embedding, slot);
   }
 
   /// Slots of the published charts within a distance, in no order.
   void near(const double* embedding, double distance, std::vector<int>& out, Neighbours::Scratch& scratch) const {
-    for (Patience patience; !indexing_.try_lock_shared();) patience.wait();
+    for (SpinWait spin; !indexing_.try_lock_shared();) spin.wait();
     const std::shared_lock lock(indexing_, std::adopt_lock);
     index_.within(embedding, distance, out, scratch);
   }

@@ -3,16 +3,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "graspatlas/continuation/charts.hpp"
+#include "graspatlas/continuation/chart.hpp"
+#include "graspatlas/continuation/front.hpp"
+#include "graspatlas/continuation/system.hpp"
 
 namespace graspatlas {
-
-/// The expansion of a chart that was begun and not ended.
-struct PausedTask {
-  std::int64_t number;  ///< in the order of the algorithm
-  std::int32_t turn;    ///< the chart's place in the generation
-  std::int32_t made;    ///< charts that it has made
-};
 
 /// How far an audit of an atlas has come; the numbers are those before the round that is going on, or was the last.
 struct AuditState {
@@ -37,11 +32,16 @@ struct Checkpoint {
   std::vector<double> closed_vertices;
   std::vector<std::uint8_t> closed_reasons;
 
-  /// The generation that is being expanded, how much of it is done, and charts that come again in the next one.
-  std::vector<std::int32_t> generation, again;
-  std::vector<PausedTask> paused;
+  /// The generation that is being expanded, how much of it is done, and charts that are deferred to the next one: see
+  /// Front.
+  std::vector<std::int32_t> generation, deferred;
+  std::vector<Expansion> paused;
+  std::int64_t position = 0, next_first = 0, expansion_count = 0;
+
   AuditState audit;
-  std::int64_t position = 0, next_first = 0, task_count = 0;
 };
+
+/// Throws Error when a checkpoint does not fit the system, or holds numbers that no atlas of it has.
+void check_checkpoint(const Checkpoint& saved, const System& system);
 
 }  // namespace graspatlas

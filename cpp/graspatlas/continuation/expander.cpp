@@ -4,18 +4,18 @@
 #include <cmath>
 #include <string>
 
+#include "graspatlas/errors.hpp"
+
 namespace graspatlas {
 
 namespace {
 
-// A centre may miss a bound by rounding only.
-constexpr double kBoundTolerance = 1e-10;
+// The step alpha is multiplied by this after each failed attempt (Algorithm 1, line 11).
+constexpr double kShrink = 0.9;
+// A vertex is closed when alpha falls below this share of the radius.
+constexpr double kSmallestStep = 0.05;
 // Numbers in a block of lists of neighbours.
 constexpr std::size_t kListBlock = 1 << 16;
-
-// Half the width of a chart's box. It encloses the ball of the chart's radius, and on a line the box must be wider than
-// the ball so that it has ends outside.
-double half_width(int dimension, double radius) { return dimension == 1 ? 1.5 * radius : radius; }
 
 }  // namespace
 
@@ -26,19 +26,19 @@ Expander::Expander(System& system, const AtlasOptions& options, Charts& charts)
       x_size_(system.configuration_size()),
       n_(system.tangent_size()),
       k_(system.dimension()),
-      newton_(system, options.newton),
+      newton_(system),
       test_(system, newton_, options.radius, options.epsilon),
+      bounds_(system),
       x_new_(x_size_),
       Phi_new_(static_cast<std::size_t>(k_) * n_),
       step_(n_),
       p_ij_(k_),
       p_ji_(k_),
-      slack_(system.bound_count()),
       bound_in_chart_(k_),
       direction_(k_),
       vertex_(k_),
       embedding_(system.embedding_size()),
-      polytope_(k_, half_width(k_, options.radius)) {
+      polytope_(k_, box_half_width(k_, options.radius)) {
   newton_.set_scales(&charts.scales());
 }
 
@@ -61,10 +61,11 @@ void Expander::start(const double* x0) {
   charts_.scales() = newton_.row_sizes();
   residual_new_ = newton_.residual();
   regularity_new_ = newton_.regularity();
-  if (!inside_bounds(x_new_.data())) {
-    const auto worst = std::min_element(slack_.begin(), slack_.end()) - slack_.begin();
+  if (!bounds_.inside(x_new_.data())) {
+    const std::vector<double>& slacks = bounds_.slacks(x_new_.data());
+    const auto worst = std::min_element(slacks.begin(), slacks.end()) - slacks.begin();
     throw Error("x0, projected onto the manifold, breaks the " + system_.bound_name(static_cast<int>(worst)) + " by " +
-                to_text(-slack_[worst]));
+                to_text(-slacks[static_cast<std::size_t>(worst)]));
   }
   add_chart(0);
 }
@@ -91,19 +92,6 @@ void Expander::start_at(const double* x, const double* Phi, ChartKey key) {
   add_chart(key);
 }
 
-bool Expander::inside_bounds(const double* x) {
-  if (slack_.empty()) return true;
-  system_.slack(x, slack_.data());
-  for (double s : slack_)
-    if (!(s >= -kBoundTolerance)) return false;
-  return true;
-}
-
-const double* Expander::embedding_of(int slot) {
-  system_.embed(charts_.center(slot), embedding_.data());
-  return embedding_.data();
-}
-
 bool Expander::expand(int i, ChartKey key, int most, int& made, Clock::time_point deadline) {
   while (made < most) {
     const int vertex = charts_[i].polytope.expandable_vertex(options_.radius);
@@ -124,7 +112,7 @@ bool Expander::expand_vertex(int i, int vertex, ChartKey key) {
   for (int c = 0; c < k_; ++c) direction_[c] = vertex_[c] / norm;
 
   Closed reason = Closed::open;
-  for (double alpha = options_.radius; alpha >= options_.smallest_step * options_.radius; alpha *= options_.shrink) {
+  for (double alpha = options_.radius; alpha >= kSmallestStep * options_.radius; alpha *= kShrink) {
     reason = attempt(i, direction_.data(), alpha);
     if (reason == Closed::open) {
       add_chart(key);
@@ -151,11 +139,13 @@ Closed Expander::attempt(int i, const double* direction, double alpha) {
   system_.integrate(charts_.center(i), step_.data(), x_new_.data());
   ++projections_;
   if (newton_.project(x_new_.data(), Phi) != Projection::converged) return Closed::not_converged;
-  if (!inside_bounds(x_new_.data())) return Closed::bounds;
+  if (!bounds_.inside(x_new_.data())) return Closed::bounds;
   if (!newton_.tangent_basis(Phi_new_.data())) return Closed::not_converged;
   residual_new_ = newton_.residual();
-  regularity_new_ = newton_.regularity();
-  if (!meets(i)) return Closed::curvature;
+  const double* x = charts_.center(i);
+  if (!test_.fits(x, Phi, x_new_.data(), Phi_new_.data(), p_ij_.data(), p_ji_.data())) return Closed::curvature;
+  regularity_new_ = newton_.regularity();  // while Newton has the factorisation there
+  if (!test_.leads_back(x, Phi, x_new_.data(), Phi_new_.data(), p_ij_.data(), p_ji_.data())) return Closed::curvature;
   const double longest = kLongestStep * options_.radius;
   if (squared_length(test_.displacement(), n_) > longest * longest) return Closed::curvature;
   return Closed::open;
@@ -189,7 +179,7 @@ void Expander::add_chart(ChartKey key) {
   chart.residual = residual_new_;
   chart.regularity = regularity_new_;
   chart.key = key;
-  polytope_.reset(k_, half_width(k_, options_.radius));
+  polytope_.reset(k_, box_half_width(k_, options_.radius));
   cut_by_bounds(j);
   meet_neighbours(j);
   chart.polytope = polytope_;
@@ -201,19 +191,12 @@ void Expander::add_chart(ChartKey key) {
 }
 
 void Expander::cut_by_bounds(int j) {
-  if (slack_.empty()) return;
-  system_.slack(charts_.center(j), slack_.data());
   const RowMatrix& B = system_.bound_normals();
+  const std::vector<double>& slacks = bounds_.slacks(charts_.center(j));
   for (int b = 0; b < system_.bound_count(); ++b) {
-    double squared = 0.0;
-    for (int a = 0; a < k_; ++a) {
-      const double* row = charts_.basis(j) + static_cast<std::size_t>(a) * n_;
-      double dot = 0.0;
-      for (int c = 0; c < n_; ++c) dot += B(b, c) * row[c];
-      bound_in_chart_[a] = dot;
-      squared += dot * dot;
-    }
-    const double slack = std::max(slack_[b], 0.0);
+    tangent_coordinates(charts_.basis(j), B.row(b).data(), k_, n_, bound_in_chart_.data());
+    const double squared = squared_length(bound_in_chart_.data(), k_);
+    const double slack = std::max(slacks[static_cast<std::size_t>(b)], 0.0);
     // The box reaches sqrt(k) r from the centre: a bound farther away cuts nothing.
     if (slack * slack >= squared * k_ * options_.radius * options_.radius) continue;
     const double norm = std::sqrt(squared);

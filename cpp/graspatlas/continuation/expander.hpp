@@ -1,21 +1,20 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
+#include "graspatlas/clock.hpp"
+#include "graspatlas/continuation/bound_check.hpp"
 #include "graspatlas/continuation/charts.hpp"
 #include "graspatlas/continuation/neighbour_test.hpp"
 #include "graspatlas/continuation/newton.hpp"
+#include "graspatlas/continuation/options.hpp"
 #include "graspatlas/continuation/polytope.hpp"
 #include "graspatlas/continuation/system.hpp"
 
 namespace graspatlas {
-
-/// Why a vertex could not be expanded. Zero means that it may still be; `covered` that an audit went on there by small
-/// steps, and found it covered.
-enum class Closed : std::uint8_t { open = 0, bounds = 1, curvature = 2, not_converged = 3, covered = 4 };
 
 /// The distance, in radii, of a new chart from the one that it is made from is at most this.
 constexpr double kLongestStep = 1.5;
@@ -23,8 +22,6 @@ constexpr double kLongestStep = 1.5;
 /// and from there the neighbours within two radii, which it cuts.
 /// The last term is for rounding.
 constexpr double kIndependent = 2.0 * (kLongestStep + 2.0) + 1e-3;
-
-using Clock = std::chrono::steady_clock;
 
 /// Expands charts: lines 6 to 12 of Algorithm 1, with the work space of one thread.
 class Expander {
@@ -39,17 +36,15 @@ class Expander {
   /// Expand a chart until no vertex is left: then true. False when it has made `most` charts, which get the keys from
   /// `key` on, or the deadline has passed. `made` is how many it has made, before this call too.
   bool expand(int slot, ChartKey key, int most, int& made, Clock::time_point deadline);
-  /// Charts that were done and have got a vertex to expand by that: a cut may make one beside a closed vertex. For the
-  /// caller to take.
-  std::vector<int>& reopened() { return reopened_; }
+  /// Charts that were done and have got a vertex to expand since the last call: a cut may make one beside a closed
+  /// vertex.
+  std::vector<int> take_reopened() { return std::exchange(reopened_, {}); }
 
   /// Adds a chart of an atlas that was saved; all that have smaller keys must be there.
   void put_back(const double* center, const double* basis, double residual, double regularity, ChartKey key);
 
   /// Adds a chart at a point of the manifold with its tangent basis, which no chart covers.
   void start_at(const double* x, const double* Phi, ChartKey key);
-
-  const double* embedding_of(int slot);
 
   /// Newton projections made so far, those of failed attempts included.
   std::int64_t projections() const { return projections_ + test_.projections(); }
@@ -67,7 +62,6 @@ class Expander {
   void find_near();
   bool meets(int i);
   void compare_regularity(int i, int j, double distance);
-  bool inside_bounds(const double* x);
   const int* keep(const std::vector<int>& list);
 
   System& system_;
@@ -76,6 +70,7 @@ class Expander {
   int x_size_, n_, k_;
   Newton newton_;
   NeighbourTest test_;
+  BoundCheck bounds_;
   std::int64_t projections_ = 0, polytope_bytes_ = 0, list_bytes_ = 0;
   std::vector<std::unique_ptr<int[]>> lists_;  // of neighbours, one after another
   int* next_list_ = nullptr;                   // where the next goes
@@ -83,7 +78,7 @@ class Expander {
 
   // Scratch: the candidate chart and its polytope, and work space of the tests.
   double residual_new_ = 0.0, regularity_new_ = 1.0;
-  std::vector<double> x_new_, Phi_new_, step_, p_ij_, p_ji_, slack_, bound_in_chart_, direction_, vertex_, embedding_;
+  std::vector<double> x_new_, Phi_new_, step_, p_ij_, p_ji_, bound_in_chart_, direction_, vertex_, embedding_;
   Polytope polytope_;
   Polytope::Scratch cut_scratch_;
   Neighbours::Scratch near_scratch_;

@@ -33,8 +33,8 @@ NeighbourTest::NeighbourTest(System& system, Newton& newton, double radius, doub
 // Eq (17) is a length, which may exceed a chart's own size: then charts on two sides of a fold would cut each other at
 // images far from the middle between them, and leave a gap. So the displacement between the centres, too, may differ
 // from either tangent space by no larger an angle than eq (18) allows between the spaces.
-bool NeighbourTest::passes(const double* x_i, const double* Phi_i, const double* x_j, const double* Phi_j, double* p_ij,
-                           double* p_ji) {
+bool NeighbourTest::fits(const double* x_i, const double* Phi_i, const double* x_j, const double* Phi_j, double* p_ij,
+                         double* p_ji) {
   system_.difference(x_i, x_j, displacement_.data());
   const double squared = squared_length(displacement_.data(), n_);
   if (squared > 4.0 * radius_ * radius_) return false;
@@ -43,11 +43,16 @@ bool NeighbourTest::passes(const double* x_i, const double* Phi_i, const double*
   if (project_displacement(Phi_i, displacement_.data(), k_, n_, p_ij) > limit) return false;
   if (project_displacement(Phi_j, displacement_.data(), k_, n_, p_ji) > limit) return false;
   if (!tangent_spaces_agree(Phi_i, Phi_j, k_, n_, cosine, work_.data())) return false;
-  const double doubt = squared > 0.0 ? squared_sheet_doubt(p_ij, p_ji, work_.data(), squared, k_) : 0.0;
+  squared_doubt_ = squared > 0.0 ? squared_sheet_doubt(p_ij, p_ji, work_.data(), squared, k_) : 0.0;
   for (int a = 0; a < k_; ++a) p_ji[a] = -p_ji[a];
+  return true;
+}
+
+bool NeighbourTest::leads_back(const double* x_i, const double* Phi_i, const double* x_j, const double* Phi_j,
+                               const double* p_ij, const double* p_ji) {
   // The newer chart was reached from an older one: the way back says more.
-  if (doubt > kDoubt * kDoubt && !leads_to(x_j, Phi_j, p_ji, x_i, Phi_i)) return false;
-  return doubt <= kGraveDoubt * kGraveDoubt || leads_to(x_i, Phi_i, p_ij, x_j, Phi_j);
+  if (squared_doubt_ > kDoubt * kDoubt && !leads_to(x_j, Phi_j, p_ji, x_i, Phi_i)) return false;
+  return squared_doubt_ <= kGraveDoubt * kGraveDoubt || leads_to(x_i, Phi_i, p_ij, x_j, Phi_j);
 }
 
 bool NeighbourTest::leads_to(const double* x_i, const double* Phi_i, const double* p, const double* x_j,

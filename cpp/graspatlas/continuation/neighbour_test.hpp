@@ -8,6 +8,7 @@
 
 #include "graspatlas/continuation/newton.hpp"
 #include "graspatlas/continuation/system.hpp"
+#include "graspatlas/continuation/tangent.hpp"
 
 namespace graspatlas {
 
@@ -101,21 +102,6 @@ inline bool determinant_negative(double* M, int k) {
   return negative;
 }
 
-inline double squared_length(const double* v, int size) {
-  double sum = 0.0;
-  for (int c = 0; c < size; ++c) sum += v[c] * v[c];
-  return sum;
-}
-
-/// out [n] = Phi' u: the tangent vector with coordinates u [k] in a basis [k x n].
-inline void tangent_vector(const double* Phi, const double* u, int k, int n, double* out) {
-  for (int c = 0; c < n; ++c) {
-    double sum = 0.0;
-    for (int a = 0; a < k; ++a) sum += Phi[static_cast<std::size_t>(a) * n + c] * u[a];
-    out[c] = sum;
-  }
-}
-
 /// Whether two points of the manifold with their tangent bases are near enough to each other, and on one sheet, to be
 /// charts that cut each other; with work space, for one thread.
 class NeighbourTest {
@@ -125,12 +111,20 @@ class NeighbourTest {
   /// Eqs (17) and (18) between points i and j, where j is the newer, and the images of each in the other's tangent
   /// space: p_ij = Phi_i (x_j (-) x_i), p_ji = Phi_j (x_i (-) x_j).
   bool passes(const double* x_i, const double* Phi_i, const double* x_j, const double* Phi_j, double* p_ij,
-              double* p_ji);
+              double* p_ji) {
+    return fits(x_i, Phi_i, x_j, Phi_j, p_ij, p_ji) && leads_back(x_i, Phi_i, x_j, Phi_j, p_ij, p_ji);
+  }
+
+  /// The two parts of `passes`: what the points and bases say alone, and, where that leaves doubts about the sheets,
+  /// projections from one point to the other. These take Newton's factorisation.
+  bool fits(const double* x_i, const double* Phi_i, const double* x_j, const double* Phi_j, double* p_ij, double* p_ji);
+  bool leads_back(const double* x_i, const double* Phi_i, const double* x_j, const double* Phi_j, const double* p_ij,
+                  const double* p_ji);
 
   /// True when the point of the manifold above p in the tangent space at x_i is x_j, and none of another sheet.
   bool leads_to(const double* x_i, const double* Phi_i, const double* p, const double* x_j, const double* Phi_j);
 
-  /// Of the last call of passes: x_j (-) x_i, and Phi_i Phi_j' [k x k], for the caller to overwrite.
+  /// Of the last call of fits or passes: x_j (-) x_i, and Phi_i Phi_j' [k x k], for the caller to overwrite.
   const double* displacement() const { return displacement_.data(); }
   double* bases_product() { return work_.data(); }
   /// Projections that leads_to has made.
@@ -140,6 +134,7 @@ class NeighbourTest {
   System& system_;
   Newton& newton_;
   double radius_, epsilon_;
+  double squared_doubt_ = 0.0;  // of the points that fitted last
   int n_, k_;
   std::int64_t projections_ = 0;
   std::vector<double> displacement_, work_, step_, above_, miss_, in_chart_;

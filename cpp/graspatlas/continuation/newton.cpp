@@ -4,10 +4,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "graspatlas/types.hpp"
+
 namespace graspatlas {
 
 namespace {
 
+// How far from an equation's zero set a point may be, to first order [units of the tangent space]: the largest |R_e(x)|
+// beside the largest entry of row e of J(x), so that no equation's scale matters.
+constexpr double kTolerance = 1e-12;
+// Steps after which a point has not converged. Newton's method takes 3 to 6 from within a chart's radius.
+constexpr int kMostIterations = 10;
 // As near the manifold as this the factorisation serves for the remaining steps, which converge at once, and for the
 // tangent basis [units of the tangent space].
 constexpr double kNearlyZero = 1e-7;
@@ -66,9 +73,8 @@ double distance_to_zero(const double* R, const double* J, int equations, int n, 
   return distance;
 }
 
-Newton::Newton(System& system, NewtonOptions options)
+Newton::Newton(System& system)
     : system_(system),
-      options_(options),
       solver_(system.tangent_size()),
       R_(system.equation_count()),
       J_(static_cast<std::size_t>(system.equation_count()) * system.tangent_size()),
@@ -103,7 +109,7 @@ Projection Newton::project(double* x, const double* Phi) {
   const int n = system_.tangent_size();
   bool nearly = false;  // the last factorisation was made nearly at the solution: it finishes the work
   double previous = HUGE_VAL;
-  for (int iteration = 0; iteration <= options_.max_iterations; ++iteration) {
+  for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
     const double distance = linearize(x);
     if (!std::isfinite(distance)) return Projection::not_converged;
     if (nearly && distance > 0.1 * previous) nearly = false;
@@ -124,7 +130,7 @@ Projection Newton::project(double* x, const double* Phi) {
 }
 
 double Newton::tolerance(const double* x) const {
-  return std::max(options_.tolerance, kRounding * largest_entry(x, system_.configuration_size()));
+  return std::max(kTolerance, kRounding * largest_entry(x, system_.configuration_size()));
 }
 
 // Inverse iteration on A A', from a start that lies along no axis.
@@ -202,7 +208,7 @@ Projection Newton::project_freely(double* x, double* Phi) {
     residual_ = 0.0;
     return Projection::converged;
   }
-  for (int iteration = 0; iteration <= options_.max_iterations; ++iteration) {
+  for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
     const double distance = linearize(x);
     const bool flat = std::any_of(row_sizes_.begin(), row_sizes_.end(), [](double size) { return size == 0.0; });
     if (std::isfinite(residual_) && flat) return Projection::singular;

@@ -10,13 +10,6 @@ namespace graspatlas {
 /// Why a projection ended; values are stable, Python shows the names.
 enum class Projection { converged, not_converged, singular };
 
-struct NewtonOptions {
-  /// How far from an equation's zero set a point may be, to first order [units of the tangent space]: the largest
-  /// |R_e(x)| beside the largest entry of row e of J(x), so that no equation's scale matters.
-  double tolerance = 1e-12;
-  int max_iterations = 10;
-};
-
 /// Largest of |R_e| / max_c |J_ec|: how far a point is from the zero sets of its equations, to first order [units of
 /// the tangent space]. Infinite where a number is not finite, or an equation is off whose row is zero.
 /// `row_sizes` [equations] gets the largest entries of the rows.
@@ -29,7 +22,7 @@ double distance_to_zero(const double* R, const double* J, int equations, int n, 
 /// The last factorisation is kept: it also gives the tangent basis at the point found.
 class Newton {
  public:
-  Newton(System& system, NewtonOptions options);
+  explicit Newton(System& system);
 
   /// Move x [configuration_size] onto the manifold along the normal space of Phi.
   /// Phi is row-major [dimension x tangent_size]: its rows are the tangent vectors.
@@ -68,7 +61,6 @@ class Newton {
   double tolerance(const double* x) const;
 
   System& system_;
-  NewtonOptions options_;
   LinearSolver solver_;
   const std::vector<double>* scales_ = nullptr;
   std::vector<double> R_, J_, row_sizes_, inverse_sizes_, step_, tangents_, corrections_;

@@ -6,7 +6,7 @@
 #include <limits>
 #include <string>
 
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/errors.hpp"
 
 namespace graspatlas {
 
@@ -66,7 +66,7 @@ void Polytope::reset(int dimension, double half_width) {
   std::fill_n(normals(), 2 * k_ * k_, 0.0);
   for (int f = 0; f < 2 * k_; ++f) normals()[f * k_ + f / 2] = f % 2 ? 1.0 : -1.0;
   std::fill_n(offsets(), 2 * k_, half_width);
-  std::fill_n(tags(), 2 * k_, kBox);
+  std::fill_n(tags(), 2 * k_, kBoxTag);
   std::fill_n(uses(), 2 * k_, corners / 2);
   std::fill_n(states(), corners, std::uint8_t{0});
   double* position = vertices();

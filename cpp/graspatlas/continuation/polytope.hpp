@@ -17,9 +17,10 @@ namespace graspatlas {
 class Polytope {
  public:
   /// Tag of the facets of the initial box; neighbours are tagged by their index, bounds by bound_tag.
-  static constexpr int kBox = -1;
+  static constexpr int kBoxTag = -1;
   static constexpr int bound_tag(int bound) { return -2 - bound; }
   static constexpr int bound_of(int tag) { return -2 - tag; }
+  static constexpr bool is_bound(int tag) { return tag <= bound_tag(0); }
 
   /// Work space of `cut`, one for each thread.
   struct Scratch {

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "graspatlas/continuation/tangent.hpp"
+#include "graspatlas/errors.hpp"
 
 namespace graspatlas {
 
@@ -38,6 +40,12 @@ void System::difference(const double* x0, const double* x1, double* out) const {
   for (int i = 0; i < tangent_size_; ++i) out[i] = x1[i] - x0[i];
 }
 
+bool System::same_point(const double* x0, const double* x1, double tolerance) const {
+  std::vector<double> d(static_cast<std::size_t>(tangent_size_));
+  difference(x0, x1, d.data());
+  return std::sqrt(squared_length(d.data(), tangent_size_)) <= tolerance;
+}
+
 void System::embed(const double* x, double* out) const { std::copy_n(x, embedding_size_, out); }
 
 void System::slack(const double*, double*) const {}
@@ -47,16 +55,5 @@ std::string System::bound_name(int i) const { return "bound " + std::to_string(i
 void System::check_point(const double*) const {}
 
 double System::radius_limit() const { return 1e100; }
-
-void check_quaternion(const double* q) {
-  const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  if (!(std::abs(length - 1.0) < 1e-6)) throw Error("the quaternion in x0 must have length 1, not " + to_text(length));
-}
-
-std::string to_text(double number) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", number);
-  return text;
-}
 
 }  // namespace graspatlas

@@ -1,28 +1,13 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <memory>
 #include <mutex>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "graspatlas/types.hpp"
+
 namespace graspatlas {
-
-/// Base of every error that this library raises; Python sees it as graspatlas.GraspAtlasError.
-struct Error : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-/// A number in a message, three digits.
-std::string to_text(double number);
-
-/// Throws Error unless the four numbers are a quaternion of length one.
-void check_quaternion(const double* quaternion);
-
-using Vector = Eigen::VectorXd;
-using Matrix = Eigen::MatrixXd;
-using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// A system of equations R(x) = 0 whose solutions form a manifold of dimension k = tangent_size -
 /// equation_count.
@@ -60,6 +45,9 @@ class System {
 
   /// x1 (-) x0 [tangent_size].
   virtual void difference(const double* x0, const double* x1, double* out) const;
+
+  /// True when two points are one, to within a tolerance [units of the tangent space].
+  virtual bool same_point(const double* x0, const double* x1, double tolerance) const;
 
   /// A point of R^embedding_size such that Euclidean distances never exceed the norm of `difference`; two
   /// names of one configuration (a quaternion and its negative) have one embedding. Charts are looked up by

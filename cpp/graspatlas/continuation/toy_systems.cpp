@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "graspatlas/continuation/angle.hpp"
+#include "graspatlas/continuation/quaternion.hpp"
+#include "graspatlas/errors.hpp"
 
 namespace graspatlas {
 
@@ -60,7 +62,7 @@ void Angles::embed(const double* x, double* out) const {
 
 double Angles::radius_limit() const { return kLargestAngularRadius; }
 
-Rotations::Rotations() : System(4, 3, 0, 9) {}
+Rotations::Rotations() : System(4, 3, 0, kRotationEmbedding) {}
 
 double Rotations::radius_limit() const { return kLargestAngularRadius; }
 
@@ -86,10 +88,6 @@ void Rotations::difference(const double* x0, const double* x1, double* out) cons
   Eigen::Map<Eigen::Vector3d>{out} = scale * d.vec();
 }
 
-void Rotations::embed(const double* x, double* out) const {
-  // |R1 - R0| in the Frobenius norm is 2 sqrt(2) sin(angle / 2), at most sqrt(2) times the angle.
-  const Eigen::Map<const Eigen::Quaterniond> q(x);
-  Eigen::Map<Eigen::Matrix3d>{out} = q.toRotationMatrix() * M_SQRT1_2;
-}
+void Rotations::embed(const double* x, double* out) const { embed_rotation(x, out); }
 
 }  // namespace graspatlas

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/errors.hpp"
 #include "graspatlas/grasp/unit_vector.hpp"
 
 namespace graspatlas {
@@ -25,7 +25,7 @@ void raise_degree(const double* knots, int span, int d, double t, const double* 
   }
 }
 
-// The same for their derivatives: from values to slopes, and from slopes to bends.
+// The same for their derivatives: from values to first derivatives, and from these to second ones.
 void raise_derivative(const double* knots, int span, int d, const double* lower, double* out) {
   for (int j = 0; j <= d; ++j) {
     const int i = span - d + j;
@@ -65,20 +65,20 @@ void BSplineBasis::evaluate(double t, Values& out) const {
   const auto above = std::upper_bound(knots_.begin() + p + 1, knots_.begin() + n, t);
   const int span = static_cast<int>(above - knots_.begin()) - 1;
   out.first = span - p;
-  // Values and slopes of the lower degrees, turn by turn in two rows.
-  double values[2][kMaxDegree + 1], slopes[kMaxDegree + 1];
+  // Values and first derivatives of the lower degrees, turn by turn in two rows.
+  double values[2][kMaxDegree + 1], first_derivatives[kMaxDegree + 1];
   int row = 0;
   values[0][0] = 1.0;
   for (int d = 1; d < p; ++d, row ^= 1) {
-    if (d == p - 1) raise_derivative(knots_.data(), span, d, values[row], slopes);
+    if (d == p - 1) raise_derivative(knots_.data(), span, d, values[row], first_derivatives);
     raise_degree(knots_.data(), span, d, t, values[row], values[row ^ 1]);
   }
   raise_degree(knots_.data(), span, p, t, values[row], out.value);
-  raise_derivative(knots_.data(), span, p, values[row], out.slope);
+  raise_derivative(knots_.data(), span, p, values[row], out.first_derivative);
   if (p == 1)
-    std::fill_n(out.bend, 2, 0.0);
+    std::fill_n(out.second_derivative, 2, 0.0);
   else
-    raise_derivative(knots_.data(), span, p, slopes, out.bend);
+    raise_derivative(knots_.data(), span, p, first_derivatives, out.second_derivative);
 }
 
 BSplinePatch::BSplinePatch(BSplineBasis u, BSplineBasis v,
@@ -104,14 +104,14 @@ void BSplinePatch::evaluate(double u, double v, PatchPoint& out) const {
     for (int j = 0; j <= v_.degree(); ++j) {
       const auto P = control_points_.col(start + j);
       row += Nv.value[j] * P;
-      row_v += Nv.slope[j] * P;
-      row_vv += Nv.bend[j] * P;
+      row_v += Nv.first_derivative[j] * P;
+      row_vv += Nv.second_derivative[j] * P;
     }
     out.o += Nu.value[i] * row;
-    out.o_u += Nu.slope[i] * row;
+    out.o_u += Nu.first_derivative[i] * row;
     out.o_v += Nu.value[i] * row_v;
-    o_uu += Nu.bend[i] * row;
-    o_uv += Nu.slope[i] * row_v;
+    o_uu += Nu.second_derivative[i] * row;
+    o_uv += Nu.first_derivative[i] * row_v;
     o_vv += Nu.value[i] * row_vv;
   }
   const UnitVector a(out.o_u), m(out.o_u.cross(out.o_v));

@@ -14,7 +14,7 @@ class BSplineBasis {
   /// At one t the p + 1 basis functions that do not vanish, from N_first on, with their derivatives.
   struct Values {
     int first;
-    double value[kMaxDegree + 1], slope[kMaxDegree + 1], bend[kMaxDegree + 1];
+    double value[kMaxDegree + 1], first_derivative[kMaxDegree + 1], second_derivative[kMaxDegree + 1];
   };
 
   /// `knots` do not descend; an inner knot comes at most p - 1 times, so that the surface's normal is continuous.

@@ -20,7 +20,7 @@ void CurvePatch::evaluate(double s, double, PatchPoint& out) const {
   const PiecewiseCubic::Value u = u_.evaluate(s), v = v_.evaluate(s);
   patch_->evaluate(u.value, v.value, out);
   const auto along = [&](Eigen::Vector3d& by_u, Eigen::Vector3d& by_v) {
-    by_u = u.slope * by_u + v.slope * by_v;
+    by_u = u.first_derivative * by_u + v.first_derivative * by_v;
     by_v.setZero();
   };
   along(out.o_u, out.o_v);

@@ -6,7 +6,10 @@
 
 #include "graspatlas/continuation/system.hpp"
 #include "graspatlas/grasp/model.hpp"
+#include "graspatlas/grasp/object_joint.hpp"
 #include "graspatlas/grasp/patch.hpp"
+#include "graspatlas/grasp/placement.hpp"
+#include "graspatlas/types.hpp"
 
 namespace graspatlas {
 
@@ -37,6 +40,21 @@ struct ContactPoint {
   Eigen::Vector3d hand_normal, object_normal;  ///< outward unit normals
 };
 
+/// What a grasp system is made of.
+struct GraspParts {
+  std::shared_ptr<Model> model;  ///< used by the system only
+  std::vector<Contact> contacts;
+  /// Hand motions that are kept [hand_v_size x p]: a column is a motion's joint velocities, of length one in the metric
+  /// of the tangent space: orthonormal for revolute joints; the identity keeps them all.
+  Matrix motions;
+  double length_scale;  ///< [m]
+  /// Limits [hand_q_size] of joints with one number each; infinite ones are none.
+  std::vector<double> lower, upper;
+  /// Joint velocities that the unit velocity of each actuated joint makes [hand_v_size x d], a column for each: the
+  /// identity unless joints mimic others.
+  Matrix transmission;
+};
+
 /// The relevant grasps R (Sections II and III): contacts, hand motions, joint limits and patch intervals.
 ///
 /// A point is x = [q, w]: Pinocchio's configuration of hand and object, then the free patch parameters, contact by
@@ -46,13 +64,7 @@ struct ContactPoint {
 /// in the plane two and one.
 class GraspSystem : public System {
  public:
-  /// Columns of `motions` [hand_v_size x p] are the joint velocities of the hand motions kept, each of length one in
-  /// the metric of the tangent space: orthonormal for revolute joints; the identity keeps them all. Limits
-  /// [hand_q_size] apply to joints with one number each; infinite ones are none. Columns of `drives`
-  /// [hand_v_size x d] are the joint velocities that the unit velocity of each driven joint makes: the identity unless
-  /// joints mimic others. The model is used by this system only.
-  GraspSystem(std::shared_ptr<Model> model, std::vector<Contact> contacts, const Matrix& motions, double length_scale,
-              const std::vector<double>& lower, const std::vector<double>& upper, const Matrix& drives);
+  explicit GraspSystem(GraspParts parts);
 
   void residual(const double* x, double* R) override;
   void linearize(const double* x, double* R, double* J) override;
@@ -65,26 +77,30 @@ class GraspSystem : public System {
   double radius_limit() const override;
   std::unique_ptr<System> clone() const override;
 
+  /// Two grasps may differ in hand motions that are frozen, of which differences say nothing.
+  bool same_point(const double* x0, const double* x1, double tolerance) const override;
+
   const Model& model() const { return *model_; }
   int contact_count() const { return static_cast<int>(contacts_.size()); }
-  int parameter_count() const { return static_cast<int>(parameters_.size()); }
+  int parameter_count() const { return static_cast<int>(free_parameters_.size()); }
   double length_scale() const { return length_scale_; }
   const std::vector<Contact>& contacts() const { return contacts_; }
   const RowMatrix& motions() const { return motions_; }
-  const RowMatrix& drives() const { return drives_; }
+  const RowMatrix& transmission() const { return transmission_; }
   const std::vector<double>& lower_limits() const { return lower_limits_; }
   const std::vector<double>& upper_limits() const { return upper_limits_; }
   /// Name of each bound, in the order of `slack`.
   const std::vector<std::string>& bound_names() const { return bound_names_; }
+  const ObjectJoint& object_joint() const { return object_joint_; }
+  int object_dof() const { return object_joint_.dof(); }
+  int actuated_count() const { return static_cast<int>(transmission_.cols()); }
 
   /// Contact points and normals at x [contact_count].
   void contact_points(const double* x, ContactPoint* out);
-  /// J [3m x drive_count]: velocities of the driven joints to those of the contact points, and Gt [3m x object dof],
-  /// the grasp matrix transposed: the object's velocity (linear at its origin, then angular; world axes) to
-  /// those of the points.
+  /// J [3m x actuated_count]: velocities of the actuated joints to those of the contact points, and Gt [3m x
+  /// object_dof], the grasp matrix transposed: the object's velocity (linear at its origin, then angular; world axes)
+  /// to those of the points.
   void grasp_matrices(const double* x, Eigen::Ref<RowMatrix> J, Eigen::Ref<RowMatrix> Gt);
-  int object_dof() const;
-  int drive_count() const { return static_cast<int>(drives_.cols()); }
 
  private:
   struct Bound {
@@ -97,33 +113,62 @@ class GraspSystem : public System {
     PatchParameter parameter;
     ParameterUnit unit;
   };
+  /// One side of a contact where it is.
   struct SideState {
     PatchPoint local;
     Eigen::Matrix3d rotation;
     Eigen::Vector3d point;
   };
+  /// In the world: the object's normal, and the hand's tangents.
+  struct ContactAxes {
+    Eigen::Vector3d m, a, b;
+  };
+  /// Derivatives of a patch's point, normal and tangents by one of its parameters, in the patch's frame.
+  struct PatchDerivative {
+    const Eigen::Vector3d &o, &m, &a, &b;
+  };
 
-  static int count_free(const std::vector<Contact>& contacts);
-  static int embedding_size(const Model& model, const std::vector<Contact>& contacts, int motions);
-  void add_joint_bounds(const std::vector<double>& lower, const std::vector<double>& upper);
+  static PatchDerivative by_u(const PatchPoint& p) { return {p.o_u, p.m_u, p.a_u, p.b_u}; }
+  static PatchDerivative by_v(const PatchPoint& p) { return {p.o_v, p.m_v, p.a_v, p.b_v}; }
+
+  void check_parts() const;
+  void collect_free_parameters();
+  void add_joint_bounds();
   void add_parameter_bounds();
+  RowMatrix normals_of_bounds() const;
+
+  template <class Visit>
+  void visit_contacts(const double* x, bool velocities, Visit visit);
   void place_side(const ContactSide& side, const double*& w, SideState& out) const;
-  void contact_entries(const SideState& hand, const SideState& object, double* entries) const;
-  Eigen::Vector3d first_tangent(const SideState& hand, const Eigen::Vector3d& a, const Eigen::Vector3d& normal) const;
-  void add_column(int v, double sign, const Eigen::Vector3d& point, const Eigen::Vector3d& a_cross_m,
-                  const Eigen::Vector3d& b_cross_m, double* J) const;
+  ContactAxes contact_axes(const SideState& hand, const SideState& object) const;
+  void write_equations(const SideState& hand, const SideState& object, const ContactAxes& axes, double*& R) const;
+  void add_velocity_column(int v, double sign, const Eigen::Vector3d& point, const Eigen::Vector3d& a_cross_m,
+                           const Eigen::Vector3d& b_cross_m, double* J) const;
+  int write_parameter_columns(const Contact& contact, const SideState& hand, const SideState& object,
+                              const ContactAxes& axes, double* J) const;
+  void write_hand_column(const SideState& hand, const ContactAxes& axes, const PatchDerivative& by, ParameterUnit unit,
+                         double* J) const;
+  void write_object_column(const SideState& object, const ContactAxes& axes, const PatchDerivative& by,
+                           ParameterUnit unit, double* J) const;
+  void write_column(const double* entries, double* J) const;
+
+  // How much a number of q or a parameter changes when its tangent coordinate changes by one.
+  double object_scale(int i) const { return i < object_joint_.lengths() ? length_scale_ : 1.0; }
+  double parameter_scale(ParameterUnit unit) const { return unit == ParameterUnit::length ? length_scale_ : 1.0; }
 
   std::shared_ptr<Model> model_;
   std::vector<Contact> contacts_;
-  RowMatrix motions_;      // columns are the hand motions kept, in joint velocities
-  RowMatrix coordinates_;  // its pseudo-inverse, transposed: joint velocities along the motions
-  RowMatrix drives_;       // columns are the joint velocities that each driven joint makes
+  RowMatrix motions_;                   // columns are the hand motions kept, in joint velocities
+  RowMatrix motions_pseudo_inverse_t_;  // its pseudo-inverse, transposed: joint velocities along the motions
+  RowMatrix transmission_;              // columns are the joint velocities that each actuated joint makes
   bool all_motions_;
-  int motion_count_, object_v_size_, rows_per_contact_;
+  int motion_count_;
+  ObjectJoint object_joint_;
+  int rows_per_contact_;
   const int* rows_;  // of the entries of a contact, those that are equations
   double length_scale_;
   std::vector<double> lower_limits_, upper_limits_;
-  std::vector<FreeParameter> parameters_;
+  std::vector<FreeParameter> free_parameters_;
   std::vector<Bound> bounds_;
   std::vector<std::string> bound_names_;
 };

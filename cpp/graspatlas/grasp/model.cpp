@@ -9,14 +9,37 @@
 #include <pinocchio/multibody.hpp>
 #include <pinocchio/parsers/urdf.hpp>
 
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/errors.hpp"
 
 namespace graspatlas {
 
 namespace {
 
-using FreeFlyerSpace = pinocchio::SpecialEuclideanOperationTpl<3, double, 0>;
-using PlanarSpace = pinocchio::SpecialEuclideanOperationTpl<2, double, 0>;
+/// Pinocchio's joints for the object, and the spaces of their configurations.
+struct FreeFlyer {
+  using Joint = pinocchio::JointModelFreeFlyer;
+  using Space = pinocchio::SpecialEuclideanOperationTpl<3, double, 0>;
+  static constexpr int q_size = 7, v_size = 6;
+};
+struct Planar {
+  using Joint = pinocchio::JointModelPlanar;
+  using Space = pinocchio::SpecialEuclideanOperationTpl<2, double, 0>;
+  static constexpr int q_size = 4, v_size = 3;
+};
+
+/// visit(FreeFlyer()) or visit(Planar()), or nothing without an object.
+template <class Visit>
+void visit_joint(const ObjectJoint& joint, const Visit& visit) {
+  switch (joint.kind()) {
+    case ObjectJoint::Kind::free_flyer:
+      return visit(FreeFlyer());
+    case ObjectJoint::Kind::planar:
+      return visit(Planar());
+    case ObjectJoint::Kind::none:
+      return;
+  }
+}
+
 template <int n>
 using Numbers = Eigen::Map<Eigen::Matrix<double, n, 1>>;
 template <int n>
@@ -77,8 +100,8 @@ struct Model::Pinocchio {
   pinocchio::Data data;
 };
 
-Model::Model(const std::string& urdf, ObjectJoint object)
-    : pinocchio_(new Pinocchio), urdf_(std::make_shared<std::string>(urdf)), object_kind_(object) {
+Model::Model(const std::string& urdf, const ObjectJoint& object)
+    : pinocchio_(new Pinocchio), urdf_(std::make_shared<std::string>(urdf)), object_joint_(object) {
   pinocchio::Model& model = pinocchio_->model;
   model = build_model(urdf);
   check_axes(model);
@@ -96,11 +119,10 @@ Model::Model(const std::string& urdf, ObjectJoint object)
     hand_frames_.push_back(
         {frame.name, static_cast<int>(frame.parentJoint), {frame.placement.rotation(), frame.placement.translation()}});
   }
-  const auto identity = pinocchio::SE3::Identity();
-  if (object == ObjectJoint::free_flyer)
-    object_joint_ = static_cast<int>(model.addJoint(0, pinocchio::JointModelFreeFlyer(), identity, "object"));
-  else if (object == ObjectJoint::planar)
-    object_joint_ = static_cast<int>(model.addJoint(0, pinocchio::JointModelPlanar(), identity, "object"));
+  visit_joint(object, [&](auto kind) {
+    const typename decltype(kind)::Joint joint;
+    object_joint_index_ = static_cast<int>(model.addJoint(0, joint, pinocchio::SE3::Identity(), "object"));
+  });
   pinocchio_->data = pinocchio::Data(model);
   placements_.resize(model.njoints);
   supports_.resize(model.njoints);
@@ -114,8 +136,8 @@ Model::Model(const Model& other)
       urdf_(other.urdf_),
       hand_q_size_(other.hand_q_size_),
       hand_v_size_(other.hand_v_size_),
+      object_joint_index_(other.object_joint_index_),
       object_joint_(other.object_joint_),
-      object_kind_(other.object_kind_),
       hand_is_euclidean_(other.hand_is_euclidean_),
       hand_joints_(other.hand_joints_),
       hand_frames_(other.hand_frames_),
@@ -144,15 +166,12 @@ void Model::integrate(const double* q, const double* v, double* out) const {
   }
   for (int i = 0; i < hand_q_size_; ++i) out[i] = q[i] + v[i];
   const double *q_object = q + hand_q_size_, *v_object = v + hand_v_size_;
-  if (object_kind_ == ObjectJoint::free_flyer) {
-    Eigen::Matrix<double, 7, 1> moved;
-    FreeFlyerSpace().integrate(ConstNumbers<7>(q_object), ConstNumbers<6>(v_object), moved);
-    Numbers<7>(out + hand_q_size_) = moved;
-  } else if (object_kind_ == ObjectJoint::planar) {
-    Eigen::Matrix<double, 4, 1> moved;
-    PlanarSpace().integrate(ConstNumbers<4>(q_object), ConstNumbers<3>(v_object), moved);
-    Numbers<4>(out + hand_q_size_) = moved;
-  }
+  visit_joint(object_joint_, [&](auto kind) {
+    using Kind = decltype(kind);
+    Eigen::Matrix<double, Kind::q_size, 1> moved;
+    typename Kind::Space().integrate(ConstNumbers<Kind::q_size>(q_object), ConstNumbers<Kind::v_size>(v_object), moved);
+    Numbers<Kind::q_size>(out + hand_q_size_) = moved;
+  });
 }
 
 void Model::difference(const double* q0, const double* q1, double* out) const {
@@ -163,13 +182,11 @@ void Model::difference(const double* q0, const double* q1, double* out) const {
   }
   for (int i = 0; i < hand_q_size_; ++i) out[i] = q1[i] - q0[i];
   const double *a = q0 + hand_q_size_, *b = q1 + hand_q_size_;
-  if (object_kind_ == ObjectJoint::free_flyer) {
-    Numbers<6> d(out + hand_v_size_);
-    FreeFlyerSpace().difference(ConstNumbers<7>(a), ConstNumbers<7>(b), d);
-  } else if (object_kind_ == ObjectJoint::planar) {
-    Numbers<3> d(out + hand_v_size_);
-    PlanarSpace().difference(ConstNumbers<4>(a), ConstNumbers<4>(b), d);
-  }
+  visit_joint(object_joint_, [&](auto kind) {
+    using Kind = decltype(kind);
+    Numbers<Kind::v_size> d(out + hand_v_size_);
+    typename Kind::Space().difference(ConstNumbers<Kind::q_size>(a), ConstNumbers<Kind::q_size>(b), d);
+  });
 }
 
 void Model::update(const double* q, bool jacobians) {

@@ -4,12 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "graspatlas/grasp/patch.hpp"
+#include "graspatlas/grasp/object_joint.hpp"
+#include "graspatlas/grasp/placement.hpp"
 
 namespace graspatlas {
-
-/// How the object moves: all six ways, in the palm's x-y plane, or there is no object.
-enum class ObjectJoint { free_flyer, planar, none };
 
 struct JointInfo {
   std::string name;
@@ -30,7 +28,7 @@ struct FrameInfo {
 class Model {
  public:
   /// `urdf` is the text of the hand's URDF; its root is the world. Throws Error when it cannot be read.
-  Model(const std::string& urdf, ObjectJoint object);
+  Model(const std::string& urdf, const ObjectJoint& object);
   Model(const Model& other);
   ~Model();
 
@@ -39,8 +37,9 @@ class Model {
   int joint_count() const { return static_cast<int>(placements_.size()); }  ///< the base, 0, included
   int hand_q_size() const { return hand_q_size_; }
   int hand_v_size() const { return hand_v_size_; }
-  int object_joint() const { return object_joint_; }  ///< -1 without an object
-  ObjectJoint object_kind() const { return object_kind_; }
+  const ObjectJoint& object_joint() const { return object_joint_; }
+  /// Joint of the tree that carries the object; -1 without one.
+  int object_joint_index() const { return object_joint_index_; }
   const std::string& urdf() const { return *urdf_; }
   const std::vector<JointInfo>& hand_joints() const { return hand_joints_; }
   const std::vector<FrameInfo>& hand_frames() const { return hand_frames_; }
@@ -67,8 +66,8 @@ class Model {
   struct Pinocchio;
   std::unique_ptr<Pinocchio> pinocchio_;
   std::shared_ptr<const std::string> urdf_;
-  int hand_q_size_, hand_v_size_, object_joint_ = -1;
-  ObjectJoint object_kind_;
+  int hand_q_size_, hand_v_size_, object_joint_index_ = -1;
+  ObjectJoint object_joint_;
   bool hand_is_euclidean_ = true;
   std::vector<JointInfo> hand_joints_;
   std::vector<FrameInfo> hand_frames_;

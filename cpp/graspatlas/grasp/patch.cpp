@@ -28,10 +28,10 @@ RevolutionPatch::RevolutionPatch(const Placement& placement, std::vector<double>
     : placement_(placement), outline_(std::move(breaks), coefficients, "an outline") {}
 
 void RevolutionPatch::evaluate(double u, double v, PatchPoint& out) const {
-  const auto [r, slope, bend] = outline_.evaluate(v);
+  const auto [r, slope, second_derivative] = outline_.evaluate(v);
   const double cosine = std::cos(u), sine = std::sin(u);
   const double w = 1.0 / std::sqrt(1.0 + slope * slope);
-  const double turn = bend * w * w;  // rate at which the meridian's direction turns with v
+  const double turn = second_derivative * w * w;  // rate at which the meridian's direction turns with v
 
   const Eigen::Matrix3d& E = placement_.rotation;
   const Eigen::Vector3d radial = cosine * E.col(0) + sine * E.col(2);

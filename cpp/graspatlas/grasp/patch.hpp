@@ -4,15 +4,9 @@
 #include <vector>
 
 #include "graspatlas/grasp/piecewise_cubic.hpp"
+#include "graspatlas/grasp/placement.hpp"
 
 namespace graspatlas {
-
-/// A rigid placement: maps coordinates of the inner frame to the outer one, p_outer = rotation p_inner +
-/// translation.
-struct Placement {
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-};
 
 /// A patch at one (u, v): the point o, the outward unit normal m and two unit tangents a, b that are normal
 /// to m, each with its derivatives by u and v. Eqs (3) and (4) of the paper.

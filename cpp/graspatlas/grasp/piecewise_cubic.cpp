@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/errors.hpp"
 
 namespace graspatlas {
 

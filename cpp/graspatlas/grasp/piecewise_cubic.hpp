@@ -12,7 +12,7 @@ class PiecewiseCubic {
  public:
   /// A value with its first and second derivatives.
   struct Value {
-    double value, slope, bend;
+    double value, first_derivative, second_derivative;
   };
 
   /// `breaks` ascend, one more than there are rows of `coefficients` [pieces x 4]; `what` names the function in errors.

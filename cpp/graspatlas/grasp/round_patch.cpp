@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/errors.hpp"
 #include "graspatlas/grasp/unit_vector.hpp"
 
 namespace graspatlas {

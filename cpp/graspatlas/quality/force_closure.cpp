@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "graspatlas/errors.hpp"
+
 namespace graspatlas {
 
 namespace {
@@ -12,7 +14,8 @@ constexpr double kGap = 1e-10;     // the margin is found to within this
 constexpr double kGrowth = 12.0;   // of the barrier's weight from one centring to the next
 constexpr double kCentred = 1e-8;  // squared Newton decrement at which a centring ends
 constexpr int kMaxNewtonSteps = 200;
-constexpr double kHopeless = -1.0;  // a barrier that starts this far outside the cones
+constexpr double kStartMargin =
+    -1.0;  // a barrier starts this far outside the cones, so that it is inside all of its own
 
 }  // namespace
 
@@ -20,7 +23,7 @@ ForceClosure::ForceClosure(GraspSystem& system, double friction, double torsiona
     : system_(system),
       friction_(friction),
       torsional_(torsional),
-      directions_(system.object_dof() == 3 ? 2 : 3),
+      directions_(system.object_joint().space_dimension()),
       force_size_(directions_ + (directions_ == 3 && torsional > 0.0 ? 1 : 0)),
       points_(system.contact_count()),
       cones_(system.contact_count()) {
@@ -29,7 +32,7 @@ ForceClosure::ForceClosure(GraspSystem& system, double friction, double torsiona
   if (!(friction > 0.0) || !std::isfinite(friction)) throw Error("friction must be positive, got " + to_text(friction));
   if (!(torsional >= 0.0) || !std::isfinite(torsional))
     throw Error("torsional friction must not be negative, got " + to_text(torsional));
-  J_.resize(3 * system.contact_count(), system.drive_count());
+  J_.resize(3 * system.contact_count(), system.actuated_count());
   Gt_.resize(3 * system.contact_count(), system.object_dof());
   normals_.setZero(force_size_, system.contact_count());
 }
@@ -98,7 +101,7 @@ void ForceClosure::set_cones() {
     outside = std::min(outside, (cone.axial_0 - cone.tangential_0.norm()) / spread);
   }
   z_.setZero(unknowns);
-  z_(unknowns - 1) = outside + kHopeless;
+  z_(unknowns - 1) = outside + kStartMargin;
 }
 
 double ForceClosure::widest_margin(bool signed_margin) {

@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 
 #include "graspatlas/grasp/grasp_system.hpp"
+#include "graspatlas/types.hpp"
 
 namespace graspatlas {
 

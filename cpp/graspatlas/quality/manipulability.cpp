@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "graspatlas/errors.hpp"
+
 namespace graspatlas {
 
 namespace {
@@ -20,7 +22,7 @@ Manipulability::Manipulability(GraspSystem& system, double length_unit) : system
     throw Error("manipulability needs an object and at least one contact");
   if (!(length_unit > 0.0) || !std::isfinite(length_unit))
     throw Error("length_unit must be positive, got " + to_text(length_unit));
-  J_.resize(3 * system.contact_count(), system.drive_count());
+  J_.resize(3 * system.contact_count(), system.actuated_count());
   Gt_.resize(3 * system.contact_count(), system.object_dof());
 }
 
@@ -28,7 +30,7 @@ void Manipulability::semi_axes(const double* x, double* out) {
   const int dof = system_.object_dof();
   std::fill_n(out, dof, 0.0);
   system_.grasp_matrices(x, J_, Gt_);
-  const int lengths = dof == 6 ? 3 : 2;
+  const int lengths = system_.object_joint().lengths();
   J_ /= length_unit_;
   Gt_.rightCols(dof - lengths) /= length_unit_;
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "graspatlas/grasp/grasp_system.hpp"
+#include "graspatlas/types.hpp"
 
 namespace graspatlas {
 

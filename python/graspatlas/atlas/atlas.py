@@ -30,7 +30,7 @@ __all__ = ["BOX_TAG", "Atlas"]
 
 
 #: Facet tag of the initial box; a tag t >= 0 is the neighbour's index, t <= -2 is bound -2 - t.
-BOX_TAG = -1
+BOX_TAG = _core.Polytope.BOX_TAG
 #: Largest entry of |R(x)| of a point that is looked up.
 ON_MANIFOLD = 1e-6
 #: How far Newton's method may come down from a point that it should lead to, as a share of the radius.
@@ -149,7 +149,7 @@ class Atlas(Light):
     @property
     def box_half_width(self) -> float:
         """Half the width of the box that each polytope was cut from: it encloses the ball, and on a line exceeds it."""
-        return 1.5 * self.radius if self.dimension == 1 else self.radius
+        return _core.box_half_width(self.dimension, self.radius)
 
     @property
     def complete(self) -> bool:
@@ -281,12 +281,7 @@ class Atlas(Light):
         above = self.point(chart, u)
         if above is None:
             return True
-        apart = float(np.linalg.norm(self.system.difference(above, point)))
-        if isinstance(self.system, _core.GraspSystem):
-            # Its differences leave out the hand motions that are frozen.
-            hand = slice(self.system.hand_q_size)
-            apart = max(apart, float(np.abs(above[hand] - point[hand]).max()))
-        return apart <= SAME_SHEET * self.radius
+        return self.system.same_point(above, point, SAME_SHEET * self.radius)
 
     def euler_characteristic(self) -> int:
         """Euler characteristic V - E + F of the surface that the charts triangulate; for closed manifolds with k = 2.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 
 __all__ = ["Audit", "Closed", "Status"]
@@ -27,11 +28,11 @@ class Status(str, Enum):
 class Closed(int, Enum):
     """Why a vertex of a polytope was not expanded; covered: an audit went on there by small steps, to other charts."""
 
-    OPEN = 0
-    BOUNDS = 1
-    CURVATURE = 2
-    NOT_CONVERGED = 3
-    COVERED = 4
+    OPEN = int(_core.Closed.OPEN)
+    BOUNDS = int(_core.Closed.BOUNDS)
+    CURVATURE = int(_core.Closed.CURVATURE)
+    NOT_CONVERGED = int(_core.Closed.NOT_CONVERGED)
+    COVERED = int(_core.Closed.COVERED)
 
 
 @dataclass(frozen=True)

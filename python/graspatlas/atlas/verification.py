@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from graspatlas import _core
 from graspatlas.atlas.atlas import BOX_TAG, Atlas
 from graspatlas.atlas.status import Closed, Status
 from graspatlas.support.arrays import Array
@@ -174,7 +175,7 @@ def _half_space(
     if tag == BOX_TAG:
         axis = int(np.abs(normal).argmax())
         return np.sign(normal[axis]) * np.eye(atlas.dimension)[axis], atlas.box_half_width
-    bound = -2 - tag
+    bound = _core.Polytope.bound_of_tag(tag)
     if bound >= len(system.bound_normals):
         return None
     p = basis @ system.bound_normals[bound]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import platform
 from datetime import datetime, timezone
 from importlib.metadata import PackageNotFoundError, version
+
+from graspatlas._core import available_threads
 
 __all__ = ["describe_machine"]
 
@@ -22,6 +23,6 @@ def describe_machine() -> dict[str, str | int]:
         except PackageNotFoundError:
             found[name] = "unknown"
     found["system"] = f"{platform.system()} {platform.machine()}"
-    found["processors"] = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    found["processors"] = available_threads()
     found["day"] = datetime.now(timezone.utc).strftime("%Y-%m-%d")
     return found

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
+
+from graspatlas._core import available_threads
 
 __all__ = ["available_bytes", "available_threads"]
 
 #: Share of the free memory that work may take.
 _MEMORY_SHARE = 0.8
-
-
-def available_threads() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def available_bytes() -> float:

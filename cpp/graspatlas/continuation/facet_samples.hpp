@@ -1,0 +1,28 @@
+#pragma once
+
+#include <vector>
+
+#include "graspatlas/continuation/polytope.hpp"
+
+namespace graspatlas {
+
+/// Points of a facet of a polytope: the centre of its vertices, and points between it and some of them.
+class FacetSamples {
+ public:
+  /// Takes those of a facet; `radius` is the chart's. They lie one after another [count x k].
+  void take(const Polytope& polytope, int facet, double radius);
+
+  int count() const { return static_cast<int>(points_.size()) / k_; }
+  const double* operator[](int i) const { return &points_[static_cast<std::size_t>(i) * static_cast<std::size_t>(k_)]; }
+
+ private:
+  /// Vertices of a facet towards which points are taken; of more some, evenly.
+  static constexpr int kMostCorners = 3;
+  /// A vertex as near to the facet's plane as this share of the radius lies in it.
+  static constexpr double kOnFacet = 1e-9;
+
+  int k_ = 1;
+  std::vector<double> points_, corners_;
+};
+
+}  // namespace graspatlas

@@ -1,0 +1,69 @@
+#include "graspatlas/continuation/flat_atlas.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "graspatlas/parallel.hpp"
+
+namespace graspatlas {
+
+namespace {
+
+void copy_facets(const Atlas& atlas, const Polytope& p, std::int64_t first, const FlatAtlas& out) {
+  const int k = p.dimension();
+  std::int64_t f = first;
+  for (int a = 0; a < p.facet_slots(); ++a) {
+    if (!p.facet_active(a)) continue;
+    std::copy_n(p.normal(a), k, out.facet_normals + f * k);
+    out.facet_offsets[f] = p.offset(a);
+    out.facet_tags[f++] = p.tag(a) >= 0 ? atlas.number(p.tag(a)) : p.tag(a);
+  }
+}
+
+void copy_chart(const Atlas& atlas, std::int64_t i, const FlatStarts& starts, const FlatAtlas& out) {
+  const System& system = atlas.system();
+  const std::int64_t k = system.dimension(), basis_size = k * system.tangent_size();
+  const Chart& chart = atlas.chart(i);
+  const Polytope& p = chart.polytope;
+  std::copy_n(atlas.center(i), system.configuration_size(), out.centers + i * system.configuration_size());
+  std::copy_n(atlas.basis(i), basis_size, out.bases + i * basis_size);
+  out.residuals[i] = chart.residual;
+  out.regularities[i] = std::abs(chart.regularity);
+  out.nearly_singular[i] = chart.rank != Rank::full;
+  copy_facets(atlas, p, starts.facets[i], out);
+  const std::int64_t first = starts.vertices[i];
+  std::copy_n(p.vertex(0), p.vertex_count() * k, out.vertices + first * k);
+  for (int a = 0; a < p.vertex_count(); ++a) out.vertex_closed[first + a] = p.state(a);
+  std::int32_t* pair = out.neighbour_pairs + 2 * starts.neighbours[i];
+  for (int c = 0; c < chart.neighbour_count; ++c) {
+    *pair++ = atlas.number(chart.neighbours[c]);
+    *pair++ = static_cast<std::int32_t>(i);
+  }
+}
+
+}  // namespace
+
+void write_starts(const Atlas& atlas, const FlatStarts& out) {
+  out.facets[0] = out.vertices[0] = out.neighbours[0] = 0;
+  parallel_for(atlas.threads(), atlas.count(), [&](int, std::int64_t first, std::int64_t last) {
+    for (std::int64_t i = first; i < last; ++i) {
+      const Chart& chart = atlas.chart(i);
+      const Polytope& p = chart.polytope;
+      out.facets[i + 1] = 0;
+      for (int a = 0; a < p.facet_slots(); ++a) out.facets[i + 1] += p.facet_active(a);
+      out.vertices[i + 1] = p.vertex_count();
+      out.neighbours[i + 1] = chart.neighbour_count;
+    }
+  });
+  for (std::int64_t* starts : {out.facets, out.vertices, out.neighbours})
+    std::partial_sum(starts, starts + atlas.count() + 1, starts);
+}
+
+void flatten(const Atlas& atlas, const FlatStarts& starts, const FlatAtlas& out) {
+  parallel_for(atlas.threads(), atlas.count(), [&](int, std::int64_t first, std::int64_t last) {
+    for (std::int64_t i = first; i < last; ++i) copy_chart(atlas, i, starts, out);
+  });
+}
+
+}  // namespace graspatlas
