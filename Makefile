@@ -10,16 +10,23 @@ $(BIN)/pybind11-stubgen graspatlas._core --output-dir $(1) --numpy-array-use-typ
 $(BIN)/ruff format --quiet --config pyproject.toml $(1)/graspatlas/_core.pyi
 endef
 
-.PHONY: demo test sanitize bench compare lint stubs format clean
+.PHONY: demo test test-slow sanitize bench compare lint stubs format clean
 
 demo: $(VENV)/.installed
 	$(BIN)/graspatlas optimize schunk_can --require force_closure:0.5:0.02 --require collision_free --refine --output out/schunk_can
 	$(BIN)/graspatlas view out/schunk_can --picture out/schunk_can/grasps.png --html out/schunk_can/grasps.html
 	@echo "Open out/schunk_can/grasps.html in a browser, or run: $(BIN)/graspatlas view out/schunk_can"
 
-# On two processes; the tests of a file share theirs, and what they compute.
+# On two processes, which take tests from each other's end when they run out; fixtures are computed once in each.
+PYTEST := $(BIN)/python -m pytest -n 2 --dist worksteal
+
+# What to run while working: every module's main behaviour, in about four minutes.
 test: $(VENV)/.tools
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(PYTEST) -m "not slow"
+
+# The rest: large atlases, all examples, whole reproductions, many runs.
+test-slow: $(VENV)/.tools
+	$(PYTEST) -m slow
 
 # The C++ core under the compiler's sanitizers; SANITIZE=thread looks for data races instead.
 SANITIZE ?= address,undefined

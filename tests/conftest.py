@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from hypothesis import HealthCheck, settings
 
 import graspatlas as ga
+from graspatlas.cli import main
 
 settings.register_profile(
     "graspatlas",
@@ -43,5 +46,26 @@ def small_result(bottle: ga.Problem) -> ga.Result:
 
 
 @pytest.fixture(scope="session")
+def planar_result() -> ga.Result:
+    return ga.optimize(ga.load_problem("planar_hand"))
+
+
+@pytest.fixture(scope="session")
 def sphere() -> ga.Atlas:
     return ga.build_atlas(ga.systems.Sphere(3), [0.0, 0.0, 1.0], radius=0.1, epsilon=0.1)
+
+
+@pytest.fixture
+def cli(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """Run the command line in this process; what the compiled libraries print is caught too."""
+
+    def run(*words: object) -> tuple[int, str, str]:
+        capfd.readouterr()
+        try:
+            status = main([str(word) for word in words])
+        except SystemExit as exit_:
+            status = int(exit_.code or 0)
+        out, err = capfd.readouterr()
+        return status, out, err
+
+    return run

@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linprog
 
 import graspatlas as ga
 from graspatlas import _core
 
 Array = NDArray[np.float64]
 DATA = Path(__file__).parent / "data"
+ROOT = Path(__file__).parents[1]
 
 
 def read_json(name: str) -> Any:
     return json.loads((DATA / name).read_text(encoding="utf-8"))
+
+
+def slow_but(values: Iterable[Any], *quick: Any) -> list[Any]:
+    """Parameters of a test, of which all but the quick ones are marked slow."""
+    return [value if value in quick else pytest.param(value, marks=pytest.mark.slow) for value in values]
 
 
 class PythonSphere(ga.System):
@@ -56,6 +65,17 @@ class Written(ga.System):
 
     def jacobian(self, x: Array) -> Any:
         return self.functions[1](x)
+
+
+def assert_same_atlas(first: ga.Atlas, second: ga.Atlas) -> None:
+    """All arrays of two atlases are the same, to the bit."""
+    ours, theirs = first.to_arrays(), second.to_arrays()
+    assert ours.keys() == theirs.keys()
+    for name, array in ours.items():
+        other = theirs[name]
+        assert array.dtype == other.dtype, name
+        assert array.shape == other.shape, name
+        assert array.tobytes() == other.tobytes(), name
 
 
 def chain(name: str, root_xyz: ArrayLike, axes: list[str], length: float, kinds: str | list[str] = "revolute") -> str:
@@ -140,25 +160,60 @@ def random_rotation(rng: np.random.Generator) -> Array:
     return np.asarray(q / np.linalg.norm(q))
 
 
-def margin_by_linear_programming(grasp: ga.Grasp, friction: float, faces: int = 240) -> float:
-    """The force-closure margin with every cone replaced by a pyramid round it: a little larger than it."""
-    m = len(grasp.contact_points)
-    rows = []
-    for i, n in enumerate(-grasp.contact_normals):
-        a = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
-        a /= np.linalg.norm(a)
-        b = np.cross(n, a)
-        for angle in np.linspace(0.0, 2.0 * np.pi, faces, endpoint=False):
-            row = np.zeros(3 * m + 1)
-            row[3 * i : 3 * i + 3] = np.cos(angle) * a + np.sin(angle) * b - friction * n
-            row[-1] = np.sqrt(1.0 + friction**2)
-            rows.append(row)
-    equalities = np.zeros((7, 3 * m + 1))
-    equalities[:6, :-1] = grasp.G
-    equalities[6, :-1] = -grasp.contact_normals.ravel()
-    cost = np.r_[np.zeros(3 * m), -1.0]
-    right = np.r_[np.zeros(6), 1.0]
-    free = [(None, None)] * (3 * m + 1)
-    solution = linprog(cost, A_ub=np.array(rows), b_ub=np.zeros(len(rows)), A_eq=equalities, b_eq=right, bounds=free)
-    assert solution.status == 0
-    return float(-solution.fun)
+def without_x1(name: str) -> ga.Problem:
+    """A bundled problem without its x1; the hand motions pass where they did."""
+    problem = ga.load_problem(name)
+    return replace(problem, x1=None, reference=problem.x1.joints)
+
+
+def symmetric_planar_problem(turn: float) -> ga.Problem:
+    """Three equal fingers round an object of three equal arcs, turned by an angle [rad] in its middle."""
+    data: dict[str, Any] = json.loads(json.dumps(ga.load_problem("planar_hand").to_dict()))
+    first, second, tip, arc, offset, palm = 0.06, 0.035, 0.035, 0.02, 0.015, 0.1
+    urdf = ['<robot name="three"><link name="palm"/>']
+    joints = {}
+    for i, name in enumerate(("first", "second", "third")):
+        angle = np.pi / 2 + i * 2.0 * np.pi / 3.0
+        anchor = palm * np.array([np.cos(angle), np.sin(angle)])
+        centre = offset * np.array([np.cos(angle + turn), np.sin(angle + turn)])
+        d = centre - anchor
+        reach = second + arc
+        elbow = np.arccos((d @ d - first**2 - reach**2) / (2.0 * first * reach))
+        base = np.arctan2(d[1], d[0]) - np.arctan2(reach * np.sin(elbow), first + reach * np.cos(elbow))
+        joints |= {f"{name}_base": float(base), f"{name}_elbow": float(elbow)}
+        urdf.append(
+            f'<link name="{name}_proximal"/><link name="{name}_distal"/>'
+            f'<joint name="{name}_base" type="continuous"><parent link="palm"/><child link="{name}_proximal"/>'
+            f'<origin xyz="{anchor[0]:.17g} {anchor[1]:.17g} 0"/><axis xyz="0 0 1"/></joint>'
+            f'<joint name="{name}_elbow" type="continuous"><parent link="{name}_proximal"/>'
+            f'<child link="{name}_distal"/><origin xyz="{first} 0 0"/><axis xyz="0 0 1"/></joint>'
+        )
+        contact = data["contacts"][i]
+        contact["hand"]["position"] = [tip, 0.0, 0.0]
+        contact["object"] |= {
+            "radius": arc,
+            "origin": [offset * np.cos(angle), offset * np.sin(angle), 0.0],
+            "u_interval": None,
+        }
+    data["hand"] = {"name": "three", "urdf": "three.urdf", "urdf_text": "".join(urdf) + "</robot>"}
+    quaternion = [0.0, 0.0, float(np.sin(turn / 2)), float(np.cos(turn / 2))]
+    data["x1"] = {"joints": joints, "object_xyz": [0.0, 0.0, 0.0], "object_quat_xyzw": quaternion}
+    return ga.Problem.from_dict(data)
+
+
+def load_script(folder: str) -> ModuleType:
+    """Import ``make_meshes.py`` of a folder under ``robots``."""
+    path = ROOT / "robots" / folder / "make_meshes.py"
+    spec = importlib.util.spec_from_file_location(f"make_meshes_{folder}", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def changed(array: Array, index: Any, value: Any) -> Array:
+    """A copy of an array with other values in one place."""
+    out = array.copy()
+    out[index] = value
+    return out

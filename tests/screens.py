@@ -1,4 +1,4 @@
-"""Looks at pictures, and at pages in a headless browser."""
+"""Looks at meshes and pictures, and at pages in a headless browser."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
+
+from graspatlas.viewer.scene import meshes
 
 Array = NDArray[np.float64]
 
@@ -73,3 +75,9 @@ def browse(address: str, folder: Path, *flags: str) -> str:
     console = [line for line in run.stderr.splitlines() if "CONSOLE" in line]
     assert not [line for line in console if re.search(r":ERROR:CONSOLE|Uncaught|THREE\.|Unsupported", line)]
     return run.stdout
+
+
+def volume(mesh: meshes.Mesh) -> float:
+    """Volume that a closed mesh encloses; negative when it is inside out."""
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    return float(np.sum(a * np.cross(b, c))) / 6.0

@@ -35,7 +35,7 @@ from graspatlas.requirements.force_closure import ForceClosure
 from graspatlas.requirements.joint_margin import JointMargin
 from graspatlas.result.refinement import Refinement
 from graspatlas.result.result import Result, load_result
-from graspatlas.search.find_grasps import find_grasps
+from graspatlas.search.grasp_search import find_grasps
 from graspatlas.systems.projection import project
 from graspatlas.systems.system import System
 from graspatlas.version import __version__ as __version__

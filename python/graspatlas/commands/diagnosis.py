@@ -16,7 +16,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.problem import Problem
 from graspatlas.requirements.collision import CollisionChecker
 from graspatlas.requirements.hulls import LARGEST_ERROR
-from graspatlas.search.find_grasps import with_first_grasp
+from graspatlas.search.grasp_search import with_first_grasp
 
 __all__ = ["NOTE", "OK", "PROBLEM", "Finding", "diagnose", "redundant_joints", "report"]
 

@@ -26,7 +26,7 @@ from graspatlas.optimizer.optimize import optimize
 from graspatlas.optimizer.options import OptimizeOptions, with_defaults
 from graspatlas.problem.problem import Problem
 from graspatlas.result.result import Result
-from graspatlas.search.find_grasps import MAX_SINGULAR, GraspSearch
+from graspatlas.search.grasp_search import MAX_SINGULAR, GraspSearch
 from graspatlas.support.deadlines import deadline_after
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.progress import progress_bar

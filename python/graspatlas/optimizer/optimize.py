@@ -21,7 +21,7 @@ from graspatlas.problem.problem import Problem
 from graspatlas.quality.batched import Quality
 from graspatlas.requirements.base import RequirementLike
 from graspatlas.result.result import Result
-from graspatlas.search.find_grasps import with_first_grasp
+from graspatlas.search.grasp_search import with_first_grasp
 from graspatlas.support.deadlines import seconds_until
 from graspatlas.support.interrupts import keeping, stoppable, stopping
 from graspatlas.support.validation import positive, whole

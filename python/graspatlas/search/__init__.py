@@ -1,6 +1,6 @@
 """The search for feasible grasps where none is known."""
 
-from graspatlas.search.find_grasps import (
+from graspatlas.search.grasp_search import (
     MAX_TRIES,
     GraspSearch,
     find_grasps,

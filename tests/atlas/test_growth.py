@@ -1,0 +1,165 @@
+"""The same atlas on any number of threads, and growth that ends at limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers import PythonSphere, Written, assert_same_atlas
+
+import graspatlas as ga
+from graspatlas import _core
+from graspatlas.atlas.growth import Growth, outlook
+from graspatlas.atlas.verification import check_atlas
+from graspatlas.support.machine import available_bytes, available_threads
+from graspatlas.systems import Angles, Rotations, Sphere, Torus
+
+SPHERE = {"radius": 0.1, "epsilon": 0.1}
+
+
+def grasp_case(name, dimension, radius):
+    problem = ga.load_problem(name)
+    return problem.system(dimension), problem.x1_array, {"radius": radius, "epsilon": 0.5}
+
+
+CASES = {
+    "sphere": lambda: (Sphere(3), [0.0, 0.0, 1.0], {"radius": 0.03, "epsilon": 0.1}),
+    "3-sphere": lambda: (Sphere(4), [0.0, 0.0, 0.0, 1.0], {"radius": 0.25, "epsilon": 0.1}),
+    "torus": lambda: (Torus(0.8, 0.5), [1.3, 0.0, 0.0], SPHERE),
+    "two angles": lambda: (Angles(2), [3.0, -3.0], {"radius": 0.2, "epsilon": 0.5}),
+    "rotations": lambda: (Rotations(), [0.0, 0.0, 0.0, 1.0], {"radius": 0.4, "epsilon": 0.5}),
+    "can": lambda: grasp_case("schunk_can", 2, 0.17),
+    "bottle": lambda: grasp_case("schunk_oil_bottle", 2, 0.04),
+    "bottle, k = 3": lambda: grasp_case("schunk_oil_bottle", 3, 0.2),
+    "planar": lambda: grasp_case("planar_hand", 2, 0.1),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_same_atlas_on_any_number_of_threads(name):
+    system, x0, options = CASES[name]()
+    one = ga.build_atlas(system, x0, threads=1, **options)
+    assert one.complete
+    assert one.n_charts > 100
+    for threads in (2, 3, 7):
+        assert_same_atlas(one, ga.build_atlas(system, x0, threads=threads, **options))
+
+
+@pytest.mark.parametrize("limit", [1, 2, 63, 64, 65, 100, 500, 1000])
+def test_limit_of_charts_is_met_exactly(limit):
+    one, many = (ga.build_atlas(Sphere(3), [0, 0, 1], max_charts=limit, threads=n, **SPHERE) for n in (1, 5))
+    assert one.n_charts == limit
+    assert one.status is many.status is ga.Status.CHART_LIMIT
+    assert_same_atlas(one, many)
+
+
+def test_slices_of_work_do_not_matter():
+    """Charts and time may run out anywhere: the work goes on as if it had never stopped."""
+    x0 = np.array([0.0, 0.0, 0.0, 1.0])
+    whole, sliced, counted = (_core.AtlasBuilder(Sphere(4), x0, 0.3, 0.1, n) for n in (1, 3, 2))
+    whole.expand(10**9, 1e9)
+    slices = 0
+    while not sliced.complete:
+        sliced.expand(10**9, 1e-4)
+        slices += 1
+    while not counted.complete:
+        counted.expand(counted.n_charts + 7, 1e9)
+    assert slices > 3
+    for name, array in whole.arrays().items():
+        assert array.tobytes() == sliced.arrays()[name].tobytes(), name
+        assert array.tobytes() == counted.arrays()[name].tobytes(), name
+
+
+def test_a_chart_with_more_neighbours_than_one_task_may_make():
+    """Charts round one in five dimensions: more than 64; the chart comes again in the next generation."""
+    one, two = (
+        ga.build_atlas(Angles(5), np.zeros(5), radius=1.0, epsilon=0.5, threads=n, max_charts=300) for n in (1, 2)
+    )
+    around_first = (one.neighbour_pairs[:, 0] == 0).sum()
+    assert around_first > 64
+    assert_same_atlas(one, two)
+
+
+def test_a_system_in_python_has_one_thread():
+    builder = _core.AtlasBuilder(PythonSphere(3), np.array([0.0, 0.0, 1.0]), 0.1, 0.1, 4)
+    assert builder.n_threads == 1
+    assert _core.AtlasBuilder(Sphere(3), np.array([0.0, 0.0, 1.0]), 0.1, 0.1, 4).n_threads == 4
+    theirs = ga.build_atlas(PythonSphere(3), [0, 0, 1], threads=4, **SPHERE)
+    assert_same_atlas(theirs, ga.build_atlas(Sphere(3), [0, 0, 1], threads=4, **SPHERE))
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
+def test_an_error_in_a_python_system_leaves_a_usable_atlas(error):
+    calls = [0]
+
+    def residual(x):
+        calls[0] += 1
+        if calls[0] == 500:
+            raise error
+        return [x @ x - 1.0]
+
+    system = Written(3, 1, residual, lambda x: [2.0 * x])
+    builder = _core.AtlasBuilder(system, np.array([0.0, 0.0, 1.0]), 0.1, 0.1, 2)
+    with pytest.raises(error):
+        builder.expand(10**9, 1e9)
+    assert 50 < builder.n_charts < 1000
+    assert len(builder.arrays()["centers"]) == builder.n_charts
+    builder.expand(10**9, 1e9)
+    assert builder.complete
+    assert builder.n_charts == pytest.approx(1170, rel=0.02)
+
+
+def test_limit_of_memory_cuts_the_atlas_short():
+    atlas = ga.build_atlas(Sphere(4), [0, 0, 0, 1], radius=0.02, epsilon=0.1, max_bytes=2e7, threads=2)
+    assert atlas.status is ga.Status.MEMORY_LIMIT
+    assert 1000 < atlas.n_charts < 200_000
+    assert "limit of memory" in str(atlas.status)
+    assert check_atlas(ga.build_atlas(Sphere(4), [0, 0, 0, 1], radius=0.05, epsilon=0.1, max_bytes=1e6)).passed
+
+
+def test_bytes_are_counted():
+    """What the builder says it holds, against the arrays that it makes."""
+    builder = _core.AtlasBuilder(Sphere(4), np.array([0.0, 0.0, 0.0, 1.0]), 0.1, 0.1, 2)
+    builder.expand(10**9, 1e9)
+    arrays = sum(array.nbytes for array in builder.arrays().values())
+    assert arrays <= builder.n_array_bytes < 1.6 * arrays
+    assert 500 < builder.n_bytes / builder.n_charts < 3000
+
+
+def test_what_the_machine_has():
+    assert available_threads() >= 1
+    assert available_bytes() > 1e8
+
+
+@pytest.mark.parametrize("name", ["threads", "max_bytes"])
+@pytest.mark.parametrize("value", [0, -1, float("nan"), "two", True])
+def test_wrong_threads_and_memory_are_refused(name, value):
+    with pytest.raises(ga.GraspAtlasError, match=name):
+        ga.build_atlas(Sphere(3), [0, 0, 1], **{name: value}, **SPHERE)
+
+
+@pytest.mark.parametrize(
+    ("name", "radius"),
+    [("schunk_can", 0.06), ("schunk_oil_bottle", 0.015), ("sphere", 0.02)],
+    ids=["can", "bottle", "sphere"],
+)
+def test_expected_size_is_about_right(name, radius):
+    if name == "sphere":
+        system, x0, options = Sphere(3), [0.0, 0.0, 1.0], {"radius": radius, "epsilon": 0.1}
+    else:
+        system, x0, options = grasp_case(name, 2, radius)
+    builder = _core.AtlasBuilder(system, np.asarray(x0), options["radius"], options["epsilon"], 2)
+    growth = Growth(builder, system, np.asarray(x0), options["radius"], options["epsilon"])
+    builder.expand(2000, 10.0)
+    early = growth.expected_size(10.0)
+    builder.expand(10**9, 1e9)
+    assert builder.complete
+    assert early == pytest.approx(builder.n_charts, rel=0.2)
+
+
+def test_expected_size_of_a_manifold_too_small_for_coarse_charts():
+    builder = _core.AtlasBuilder(Angles(2), np.zeros(2), 1.0, 0.5, 1)
+    growth = Growth(builder, Angles(2), np.zeros(2), 1.0, 0.5)
+    builder.expand(3, 1.0)
+    assert growth.expected_size(1.0) is None
+    assert outlook(builder, None, 1.0) == f"{builder.n_open} open"
+    assert outlook(builder, 95_123, 1.0).endswith(" open; about 95,000 charts in all, 31707 s left")
