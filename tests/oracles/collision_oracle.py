@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 import graspatlas as ga
+from graspatlas.problem.object_joint import FREE_FLYER
 
 DEPTH, CLEARANCE = 0.002, 0.001
 #: Flags are compared where distances are not this near to what decides [m].
@@ -93,7 +94,7 @@ def made_problem(folder: Any, hand_kinds: str, object_kinds: str, tip: str = "s"
         hand=ga.Hand("made", urdf + "</robot>"),
         object=ga.Body("thing", body + "</robot>"),
         contacts=[SimpleNamespace(frame="a2")],
-        object_joint="free_flyer",
+        object_joint_model=FREE_FLYER,
     )
 
 
