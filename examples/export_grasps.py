@@ -32,7 +32,7 @@ def main() -> None:
     T_world_object[:3, 3] = [0.5, 0.0, 0.06]
     with open(folder / "grasps.json", encoding="utf-8") as stream:
         file = json.load(stream)
-    assert (file["format"], file["version"]) == ("graspatlas grasps", 1)
+    assert (file["format"], file["version"]) == ("graspatlas grasps", 2)
     for row in file["grasps"]:
         T_world_palm = T_world_object @ result.grasp(row["chart"]).T_object_palm
         same = T_world_object[:3, :3] @ row["palm_in_object"]["xyz"] + T_world_object[:3, 3]

@@ -91,7 +91,7 @@ def test_the_hand_closes_as_published(problem):
 
 
 def test_grasps_found_as_a_start_let_an_atlas_grow(problem):
-    """Some grasps of this hand are special: an atlas cannot grow from them, and a search for components goes on."""
+    """Some grasps of this hand are singular: an atlas cannot grow from them, and a search for components goes on."""
     search = GraspSearch(problem, 2, seed=0)
     grasps = ga.find_grasps(problem, count=100, dimension=2)
     regular = [search.is_regular(x) for x in grasps]

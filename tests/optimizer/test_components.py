@@ -263,14 +263,14 @@ def test_command_line(cli, tmp_path):
     assert json.loads(out)["status"] in map(str, ga.SearchStatus)
 
 
-def test_special_grasps_do_not_end_the_search(monkeypatch):
-    """No atlas can grow from a special grasp, where the equations lose rank: it is left, and the search goes on."""
+def test_singular_grasps_do_not_end_the_search(monkeypatch):
+    """No atlas can grow from a singular grasp, where the equations lose rank: it is left, and the search goes on."""
     regular = iter([False, True])
     monkeypatch.setattr(GraspSearch, "is_regular", lambda self, x: next(regular, True))
     assert len(ga.find_components(without_x1("planar_hand"), covered=20)) == 2
 
 
-def test_special_grasps_alone_are_tried_all_the_same(monkeypatch):
+def test_singular_grasps_alone_are_tried_all_the_same(monkeypatch):
     """After many in a row one is tried, so that the atlas says what is wrong; the other component is not reached."""
     monkeypatch.setattr(GraspSearch, "is_regular", lambda self, x: False)
     found = ga.find_components(without_x1("planar_hand"), covered=20)

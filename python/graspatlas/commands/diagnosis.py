@@ -27,7 +27,7 @@ OK, NOTE, PROBLEM = "ok", "note", "problem"
 RANK_TOLERANCE = 1e-8
 #: A joint takes part in a motion when it has at least this share of the fastest joint's velocity.
 TAKES_PART = 1e-3
-#: How far from x1 the freedoms are looked at again, since x1 may be a special posture [rad, or lengths / length_scale].
+#: How far from x1 the freedoms are looked at again, since x1 may be singular [rad, or lengths / length_scale].
 AWAY = 0.1
 #: A joint or parameter this near its limit is pointed out [rad, or lengths / length_scale].
 NEAR_LIMIT = 0.02
@@ -235,7 +235,7 @@ def redundant_joints(problem: Problem) -> list[list[str]]:
 
 
 def _near_x1(problem: Problem) -> Array:
-    """A configuration near x1 that is no special one; its contacts are open."""
+    """A configuration near x1 that is not singular; its contacts are open."""
     system = problem.full_system
     step = AWAY * np.random.default_rng(0).uniform(-1.0, 1.0, system.tangent_size)
     return np.asarray(system.integrate(problem.x1_array, step))
@@ -265,14 +265,14 @@ def _redundancies(problem: Problem) -> Iterator[Finding]:
     extra = len(_null_space(J_x1[:, :h])) - len(groups)
     if groups:
         text = "; ".join(" with ".join(group) for group in groups)
-        hint = "no contact feels these joint velocities, and the atlas sweeps them in vain: lock joints (hand: locked)"
+        hint = "they move no contact, and the atlas traces them needlessly: lock joints (hand: locked)"
         yield Finding(NOTE, "redundancies", f"{len(groups)}: {text}", hint)
     elif extra > 0:
         text = f"none, but at x1 itself the contacts do not feel {extra} motion{'s' if extra > 1 else ''} of the joints"
-        hint = "x1 is a special posture, such as a straight finger; bend it a little if the atlas is refused"
+        hint = "x1 is singular, as with a straight finger; bend it a little if no atlas can grow from it"
         yield Finding(NOTE, "redundancies", text, hint)
     else:
-        yield Finding(OK, "redundancies", "none: every joint velocity moves a contact", "nothing is swept in vain")
+        yield Finding(OK, "redundancies", "none: every joint velocity moves a contact", "nothing is traced needlessly")
     loose = min(len(_null_space(J[:, h:])) for J in (J_x1, J_near))
     if loose:
         text = f"it can move in {loose} way{'s' if loose > 1 else ''} while the hand stays still"

@@ -64,7 +64,7 @@ def read_mimics(root: ElementTree.Element) -> tuple[Mimic, ...]:
 
     Raises:
         GraspAtlasError: If a joint mimics itself, one that there is not or that does not move, or a continuous one in
-            a way that a whole turn does not repeat; or if a number of the tag is none.
+            a way that a whole turn does not repeat; or if a number of the tag is not a number.
     """
     joints = {str(joint.get("name")): joint for joint in root.findall("joint") if joint.get("type") != "fixed"}
     links = {name: _link(name, tag, joints) for name in joints if (tag := joints[name].find("mimic")) is not None}

@@ -42,7 +42,7 @@ class Reading:
         requirements: What a grasp must meet to be the best or the worst.
 
     Raises:
-        GraspAtlasError: If a requirement is none.
+        GraspAtlasError: If a requirement is neither a named one nor a function.
     """
 
     indices: Sequence[Quality]
@@ -117,7 +117,7 @@ def check_atlas_of(problem: Problem, options: Mapping[str, Any], atlas: Atlas) -
         atlas: What was given.
 
     Raises:
-        GraspAtlasError: If it is none, has other options, or its charts are no grasps of the problem.
+        GraspAtlasError: If it is not an atlas, has other options, or its charts are no grasps of the problem.
     """
     checked_instance(atlas, Atlas, "atlas", "the attribute atlas of results and errors")
     dimension = options["dimension"]

@@ -1,4 +1,4 @@
-"""The search for the shortest path between two grasps that never lets go.
+"""The search for the shortest path between two grasps that keeps all contacts.
 
 Charts that neighbour each other make a graph; its shortest path is bridged on the manifold and pulled tight there
 (:mod:`graspatlas.systems.geodesic`), since a path from centre to centre zigzags.

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.first_grasp import LARGEST, unit_quaternion
+from graspatlas.problem.object_joint import PLANAR
 from graspatlas.support.validation import checked_table, number_array, numbers
 
 __all__ = ["PoseGuess"]
@@ -35,6 +36,17 @@ class PoseGuess:
             raise GraspAtlasError(f"xyz of the pose guess must be 3 finite numbers, got {self.xyz}")
         if self.quat_xyzw is not None:
             object.__setattr__(self, "quat_xyzw", unit_quaternion(self.quat_xyzw, "the pose guess"))
+
+    def check_in_plane(self) -> None:
+        """Make sure that the guess lies in the palm's x-y plane, turned about z only.
+
+        Raises:
+            GraspAtlasError: If it does not.
+        """
+        if not PLANAR.allows(self.xyz, self.quat_xyzw or (0.0, 0.0, 0.0, 1.0)):
+            raise GraspAtlasError(
+                "the object moves in the x-y plane, so 'pose_guess' must lie there: z = 0, and turned about z only"
+            )
 
     def offset(self, xyz: ArrayLike, rotation: Rotation) -> tuple[float, float]:
         """How far a pose is from the guess: distance [m], and angle [rad], 0 where any rotation will do.

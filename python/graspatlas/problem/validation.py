@@ -71,10 +71,8 @@ def check_lengths(length_scale: float, torque_length: float | None) -> None:
 
 def check_poses(joint: ObjectJoint, x1: FirstGrasp | None, guess: PoseGuess | None) -> None:
     """Raise GraspAtlasError unless the object can get to where a first grasp and a guess have it."""
-    if guess is not None and not joint.allows(guess.xyz, guess.quat_xyzw or (0.0, 0.0, 0.0, 1.0)):
-        raise GraspAtlasError(
-            "the object moves in the x-y plane, so 'pose_guess' must lie there: z = 0, and turned about z only"
-        )
+    if guess is not None and joint.planar:
+        guess.check_in_plane()
     if x1 is not None and not joint.allows(x1.object_xyz, x1.object_quat_xyzw):
         raise GraspAtlasError("in a planar problem x1's object lies in the x-y plane: z = 0, and turned about z only")
 

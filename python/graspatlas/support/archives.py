@@ -34,8 +34,8 @@ def read_arrays(stream: BinaryIO) -> dict[str, Any]:
         stream: The archive; it must be one that can be read from anywhere.
 
     Raises:
-        DamagedArchive: If it is none, is damaged, holds Python objects, or would take more memory than its file is
-            worth or than there is.
+        DamagedArchive: If it is not an archive, is damaged, holds Python objects, or would take more memory than its
+            file is worth or than there is.
     """
     try:
         with zipfile.ZipFile(stream) as archive:
