@@ -18,6 +18,7 @@ class SpinWait {
   }
 
  private:
+  /// Pauses, some microseconds in all; then what is waited for may need the core.
   static constexpr int kPauses = 64;
 
   static void pause() {

@@ -50,8 +50,8 @@ class TaskWindow {
  private:
   /// Places in the window: bits of Task::awaited.
   static constexpr int kPlaces = 32;
-  /// How often a thread looks whether it may go on before it goes to sleep: for some 50 microseconds, longer than most
-  /// expansions take and about what it costs to be woken.
+  /// How often a thread looks whether it may go on before it goes to sleep: longer than most expansions take, since to
+  /// be woken costs more than to wait for one.
   static constexpr int kSpinsBeforeSleep = 1000;
   /// A generation of fewer charts is left to one thread: others would mostly wait for it.
   static constexpr int kLeastForHelpers = 16;
