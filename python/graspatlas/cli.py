@@ -6,7 +6,7 @@ import argparse
 import signal
 import sys
 from collections.abc import Sequence
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from graspatlas.commands.analysis import add_analysis_commands
 from graspatlas.commands.exit_status import INTERRUPTED, MISUSE
@@ -21,6 +21,9 @@ from graspatlas.start_up import hear_interrupts
 from graspatlas.support.interrupts import stoppable, stopped_by
 from graspatlas.support.terminal import finish_output, printable, say, shortened, silence_output
 from graspatlas.version import __version__
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 __all__ = ["main"]
 
@@ -81,7 +84,7 @@ def _misuse(reason: object) -> int:
 class _Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, like all others."""
 
-    def _print_message(self, message: str, file: Any = None) -> None:
+    def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
         """Help and version; argparse keeps quiet where they cannot be written."""
         say(message, file=None if file is sys.stdout else file, end="")
 

@@ -16,20 +16,19 @@ Neither returns anything: the first identity that does not hold is an error that
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.patches.base import Patch
 from graspatlas.patches.registry import patch_from_dict
+from graspatlas.support.arrays import Array
 from graspatlas.systems.system import AnySystem, jacobian_error
 
 __all__ = ["check_patch", "check_system"]
 
-Array = NDArray[np.float64]
 
 #: How far a central difference with a step of 1e-6 may be off, relative to the largest entry or 1.
 DERIVATIVE = 1e-6
@@ -166,7 +165,7 @@ class _Check:
             raise GraspAtlasError(f"{self.subject}: not so: {identity}; got {got}")
 
 
-def _largest(difference: Any) -> float:
+def _largest(difference: Array) -> float:
     return float(np.abs(difference).max(initial=0.0))
 
 

@@ -15,20 +15,19 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from graspatlas.analysis.local_model import LocalModel, Objective
 from graspatlas.analysis.unbounded import followed, is_sharp, levels_around, never_levels_off, rises_towards_one_point
 from graspatlas.errors import GraspAtlasError
 from graspatlas.quality.evaluation import evaluate
 from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.support.arrays import Array
 from graspatlas.support.deadlines import deadline_after
 from graspatlas.support.validation import checked_instance, number_array, shown, whole
 
 __all__ = ["MAX_STEPS", "Climb", "climb"]
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 #: Steps after which a climb is given up.
 MAX_STEPS = 200

@@ -17,7 +17,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.atlas.grid import Grid, grid_blocks, joined_grid
 from graspatlas.errors import GraspAtlasError
@@ -26,14 +25,12 @@ from graspatlas.problem.problem import Problem
 from graspatlas.quality.evaluation import evaluate
 from graspatlas.requirements.screening import screen
 from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.renamed import renamed_attribute
 from graspatlas.support.validation import positive
 
 __all__ = ["Samples", "densify", "jumps"]
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +46,7 @@ class Samples(Grid):
 
     problem: Problem
     qualities: Array
-    accepted: NDArray[np.bool_]
+    accepted: BoolArray
     rejected: dict[str, int]
     __repr__ = Grid.__repr__
 
@@ -101,7 +98,7 @@ def densify(result: GraspAtlas, spacing: float, *, share: float = 1.0, progress:
     positive(share, "share", most=1.0)
     count = int(np.ceil(share * result.atlas.n_charts))
     charts = np.sort(np.argsort(-jumps(result), kind="stable")[:count])
-    done: list[tuple[Grid, Array, NDArray[np.bool_], dict[str, int]]] = []
+    done: list[tuple[Grid, Array, BoolArray, dict[str, int]]] = []
     blocks = grid_blocks(result.atlas, spacing, charts, progress)
     complete = True
     try:

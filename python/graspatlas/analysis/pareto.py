@@ -11,16 +11,14 @@ several indices::
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.support.arrays import Array, IntArray
 
 __all__ = ["knee", "pareto_front", "values_of"]
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 def pareto_front(result: GraspAtlas, *indices: Quality) -> IntArray:

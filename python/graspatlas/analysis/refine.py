@@ -6,7 +6,6 @@ import time
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.analysis.climb import MAX_STEPS, Climb, climb
 from graspatlas.analysis.peaks import Peak, local_maxima, peaks_of
@@ -19,7 +18,6 @@ from graspatlas.support.progress import progress_bar
 
 __all__ = ["refine"]
 
-Array = NDArray[np.float64]
 
 #: Local maxima of the atlas from which to climb, the best first.
 MOST_STARTS = 40

@@ -13,11 +13,11 @@ from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+
+from graspatlas.support.arrays import Array
 
 __all__ = ["Model", "followed", "is_sharp", "levels_around", "never_levels_off", "rises_towards_one_point"]
 
-Array = NDArray[np.float64]
 
 #: Sizes of the rings, as shares of the chart radius.
 RINGS = 10.0 ** -np.arange(1.0, 6.0)

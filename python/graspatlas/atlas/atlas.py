@@ -16,7 +16,7 @@ from graspatlas import _core
 from graspatlas.atlas.status import Audit, Closed, Status
 from graspatlas.atlas.topology import euler_characteristic, facet_ring
 from graspatlas.errors import GraspAtlasError
-from graspatlas.support.arrays import AnyArray, Array, IntArray
+from graspatlas.support.arrays import AnyArray, Array, BoolArray, Int32Array, IntArray
 from graspatlas.support.columns import joined, to_frame
 from graspatlas.support.pickling import Light
 from graspatlas.support.validation import number_array, read_only
@@ -76,15 +76,15 @@ class Atlas(Light):
     bases: Array
     residuals: Array
     regularities: Array
-    nearly_singular: NDArray[np.bool_]
+    nearly_singular: BoolArray
     facet_start: IntArray
     facet_normals: Array
     facet_offsets: Array
-    facet_tags: NDArray[np.int32]
+    facet_tags: Int32Array
     vertex_start: IntArray
     vertices: Array
     vertex_closed: NDArray[np.uint8]
-    neighbour_pairs: NDArray[np.int32]
+    neighbour_pairs: Int32Array
 
     def __repr__(self) -> str:
         sizes = f"k = {self.dimension}, r = {self.radius:g}, epsilon = {self.epsilon:g}"
@@ -197,7 +197,7 @@ class Atlas(Light):
             if reason is not Closed.OPEN
         }
 
-    def facets(self, chart: int) -> tuple[Array, Array, NDArray[np.int32]]:
+    def facets(self, chart: int) -> tuple[Array, Array, Int32Array]:
         """Unit normals [f, k], offsets [f] and tags [f] of a chart's polytope: normals u <= offsets."""
         rows = slice(self.facet_start[chart], self.facet_start[chart + 1])
         return self.facet_normals[rows], self.facet_offsets[rows], self.facet_tags[rows]

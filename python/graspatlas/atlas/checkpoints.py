@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.support.archives import DamagedArchive, read_arrays
+from graspatlas.support.arrays import AnyArray, Array
 from graspatlas.support.files import opened, replaced, stated_path
 from graspatlas.systems.system import AnySystem
 
@@ -33,7 +33,7 @@ _KINDS = {
 _STEP = 1e-3
 
 
-def run_digest(system: AnySystem, x0: NDArray[np.float64], radius: float, epsilon: float) -> str:
+def run_digest(system: AnySystem, x0: Array, radius: float, epsilon: float) -> str:
     """Digest that tells runs apart: the options, and the system's numbers at x0 and a step away from it."""
     digest = hashlib.sha256(json.dumps([VERSION, type(system).__name__, radius, epsilon]).encode())
     away = system.integrate(x0, np.full(system.tangent_size, _STEP))
@@ -60,7 +60,7 @@ class CheckpointFolder:
         self.digest = digest
         self._n_files = self._n_charts = 0
 
-    def load(self) -> dict[str, Any] | None:
+    def load(self) -> dict[str, AnyArray] | None:
         """What ``AtlasBuilder.resume`` needs; None when there is no checkpoint.
 
         Raises:
@@ -80,15 +80,15 @@ class CheckpointFolder:
         self._n_files, self._n_charts = len(parts), int(parts[-1]["first"])
         return out
 
-    def _joined(self, name: str, parts: list[dict[str, Any]]) -> NDArray[Any]:
+    def _joined(self, name: str, parts: list[dict[str, AnyArray]]) -> AnyArray:
         """An array of all charts [flat]: each file says anew what older ones say from its first chart on."""
-        whole: NDArray[Any] = parts[0][name].reshape(len(parts[0]["keys"]), -1)
+        whole: AnyArray = parts[0][name].reshape(len(parts[0]["keys"]), -1)
         for part in parts[1:]:
             added = part[name].reshape(len(part["keys"]), whole.shape[1]) if part["keys"].size else whole[:0]
             whole = np.concatenate([whole[: int(part["first"])], added])
         return whole.ravel()
 
-    def _read(self, path: Path) -> dict[str, Any]:
+    def _read(self, path: Path) -> dict[str, AnyArray]:
         try:
             with opened(path, "checkpoint") as stream:
                 part = read_arrays(stream)

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.atlas.atlas import Atlas
+from graspatlas.support.arrays import Array
 from graspatlas.systems.system import AnySystem
 
 __all__ = ["Coverage", "measure_coverage"]
 
-Array = NDArray[np.float64]
 
 #: Steps of one walk, and their longest length as a share of the chart radius.
 WALK_STEPS = 6

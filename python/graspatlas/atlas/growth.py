@@ -6,14 +6,12 @@ import sys
 import time
 from collections.abc import Callable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from graspatlas import _core
 from graspatlas.atlas.checkpoints import CheckpointFolder
 from graspatlas.atlas.limits import Limits
 from graspatlas.atlas.status import Status
 from graspatlas.errors import GraspAtlasError
+from graspatlas.support.arrays import Array
 from graspatlas.support.interrupts import hear, held, stopping
 from graspatlas.support.progress import QUIET_SECONDS, is_shown, progress_bar
 from graspatlas.systems.system import AnySystem
@@ -42,7 +40,7 @@ class Growth:
         self,
         builder: _core.AtlasBuilder,
         system: AnySystem,
-        x0: NDArray[np.float64],
+        x0: Array,
         radius: float,
         epsilon: float,
     ) -> None:

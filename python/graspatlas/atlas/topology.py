@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from graspatlas.support.arrays import Array
+from graspatlas.support.arrays import Array, Int32Array
 
 __all__ = ["euler_characteristic", "facet_ring"]
 
 
-def facet_ring(normals: Array, offsets: Array, tags: NDArray[np.int32], shortest: float) -> list[int]:
+def facet_ring(normals: Array, offsets: Array, tags: Int32Array, shortest: float) -> list[int]:
     """Neighbours behind the facets of a polygon that are longer than `shortest`, in order round it.
 
     Args:

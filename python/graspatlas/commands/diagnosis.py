@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from graspatlas.atlas.build import build_atlas
@@ -17,10 +16,10 @@ from graspatlas.problem.problem import Problem
 from graspatlas.requirements.collision import CollisionChecker
 from graspatlas.requirements.hulls import LARGEST_ERROR
 from graspatlas.search.grasp_search import with_first_grasp
+from graspatlas.support.arrays import Array
 
 __all__ = ["NOTE", "OK", "PROBLEM", "Finding", "diagnose", "redundant_joints", "report"]
 
-Array = NDArray[np.float64]
 
 OK, NOTE, PROBLEM = "ok", "note", "problem"
 #: A singular value below this share of the largest one is zero.

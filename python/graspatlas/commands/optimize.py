@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from graspatlas.analysis.climb import MAX_STEPS
 from graspatlas.atlas.checkpoints import CheckpointFolder
@@ -142,6 +142,6 @@ def _report_components(found: Components, options: argparse.Namespace, folder: P
     return 0 if best.accepted.any() else FAILED
 
 
-def _write_json(table: dict[str, Any], path: Path) -> None:
+def _write_json(table: Mapping[str, object], path: Path) -> None:
     with replaced(path) as stream:
         stream.write((json.dumps(table, indent=2) + "\n").encode("utf-8"))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from typing import Any
 
 from graspatlas.commands.arguments import Subcommands, path_word
 from graspatlas.commands.charts import chart_named
@@ -14,6 +13,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.result.result import load_result
 from graspatlas.support.columns import FRAME_ENDINGS, save_frame
 from graspatlas.support.terminal import say
+from graspatlas.support.validation import PlainTable
 
 __all__ = ["add_result_commands"]
 
@@ -77,7 +77,7 @@ def _export(options: argparse.Namespace) -> int:
     if (options.best is not None or options.accepted) and not result.accepted.any():
         say(f"{result.problem.name}: no grasp meets the requirements, nothing was written", file=sys.stderr)
         return FAILED
-    summary: dict[str, Any] = {"problem": result.problem.name, "n_charts": result.atlas.n_charts}
+    summary: PlainTable = {"problem": result.problem.name, "n_charts": result.atlas.n_charts}
     if options.grasps:
         charts = options.chart and [chart_named(result, name) for name in options.chart]
         chosen = {name: getattr(options, name) for name in ("best", "accepted", "refined")}

@@ -10,28 +10,30 @@ from __future__ import annotations
 import reprlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasps
+from graspatlas.support.arrays import AnyArray, Array, BoolArray
 
 __all__ = ["called_flags", "called_numbers", "is_batched"]
 
+#: A function of one grasp, or of a batch: :func:`is_batched` tells which. What it returns is looked at.
+GraspFunction: TypeAlias = Callable[[Any], object]
 #: Kinds of NumPy types.
 _NUMBERS, _FLAGS = "buif", "b"
 #: Characters of an error's text that are passed on.
 _LONGEST = 300
 
 
-def is_batched(function: Callable[[Any], Any]) -> bool:
+def is_batched(function: GraspFunction) -> bool:
     """True for a callable that takes all grasps at once; see :func:`graspatlas.batched`."""
     return bool(getattr(function, "batched", False))
 
 
-def called_numbers(index: Callable[[Any], Any], name: str, grasps: Grasps) -> NDArray[np.float64]:
+def called_numbers(index: GraspFunction, name: str, grasps: Grasps) -> Array:
     """The numbers that an index of your own returns for grasps [n]; finite.
 
     Args:
@@ -54,7 +56,7 @@ def called_numbers(index: Callable[[Any], Any], name: str, grasps: Grasps) -> ND
     return values
 
 
-def called_flags(requirement: Callable[[Any], Any], name: str, grasps: Grasps) -> NDArray[np.bool_]:
+def called_flags(requirement: GraspFunction, name: str, grasps: Grasps) -> BoolArray:
     """What a requirement of your own says of grasps [n].
 
     Args:
@@ -68,7 +70,7 @@ def called_flags(requirement: Callable[[Any], Any], name: str, grasps: Grasps) -
     return _called(requirement, f"requirement '{name}'", "boolean", _FLAGS, grasps).astype(bool)
 
 
-def _called(function: Callable[[Any], Any], who: str, what: str, kinds: str, grasps: Grasps) -> NDArray[Any]:
+def _called(function: GraspFunction, who: str, what: str, kinds: str, grasps: Grasps) -> AnyArray:
     """One value for each grasp [n], of a NumPy type of these kinds."""
     n = len(grasps)
     if is_batched(function):
@@ -95,7 +97,7 @@ def _named(who: str, place: str) -> Iterator[None]:
         raise GraspAtlasError(f"{who} raised {type(error).__name__}{place}: {text}") from error
 
 
-def _checked(returned: Any, shape: tuple[int, ...], rule: str, kinds: str, place: str = "") -> NDArray[Any]:
+def _checked(returned: object, shape: tuple[int, ...], rule: str, kinds: str, place: str = "") -> AnyArray:
     """What came as an array of this shape, if it is made of numbers or flags."""
     try:
         array = np.asarray(returned)
@@ -118,14 +120,14 @@ def _checked(returned: Any, shape: tuple[int, ...], rule: str, kinds: str, place
     raise GraspAtlasError(f"{rule}; it returned {_shown(returned)}{place}{hint}")
 
 
-def _has_masked(returned: Any) -> bool:
+def _has_masked(returned: object) -> bool:
     """True for a masked array with a masked entry, and for a list of such: as plain arrays they have numbers there."""
     if isinstance(returned, list | tuple):
         return any(_has_masked(item) for item in returned if not isinstance(item, float))
     return bool(np.ma.is_masked(returned)) if np.ma.isMaskedArray(returned) else False
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     """A value for a message, in one short line; of large things the type."""
     if value is None:
         return "None; a return statement may be missing"

@@ -9,22 +9,23 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from graspatlas import _core
+from graspatlas.support.arrays import Array
 from graspatlas.support.pickling import Light
 from graspatlas.support.validation import number_array, read_only
 
 if TYPE_CHECKING:
+    import pinocchio as pin
+
     from graspatlas.problem.problem import Problem
 
 __all__ = ["Grasp", "Grasps"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,12 +94,12 @@ class Grasp:
         return np.asarray(Rotation.from_matrix(self.T_object_palm[:3, :3]).as_quat())
 
     @property
-    def object_pose(self) -> Any:
+    def object_pose(self) -> pin.SE3:
         """Pose of the object in the palm's frame, as a ``pinocchio.SE3``; metres."""
         return _se3(self.T_palm_object)
 
     @property
-    def palm_pose(self) -> Any:
+    def palm_pose(self) -> pin.SE3:
         """Pose of the palm in the object's frame, as a ``pinocchio.SE3``; metres."""
         return _se3(self.T_object_palm)
 
@@ -316,7 +317,7 @@ def _quaternions(T: Array) -> Array:
     return np.asarray(Rotation.from_matrix(T[:, :3, :3]).as_quat()).reshape(-1, 4)
 
 
-def _se3(T: Array) -> Any:
+def _se3(T: Array) -> pin.SE3:
     """A transform [4, 4] as Pinocchio has it."""
     import pinocchio as pin  # slow to import
 

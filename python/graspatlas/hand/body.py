@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import TypedDict
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.robot_files import find_file, package_folders
@@ -13,7 +13,7 @@ from graspatlas.hand.urdf import box_urdf, cylinder_urdf, sphere_urdf
 from graspatlas.hand.urdf_checks import check_urdf
 from graspatlas.support.files import read_text
 from graspatlas.support.pickling import Light
-from graspatlas.support.validation import checked_table
+from graspatlas.support.validation import PlainTable, StatedTable, checked_table
 
 __all__ = ["Body"]
 
@@ -152,14 +152,14 @@ class Body(Light):
         """
         return Body(name, cylinder_urdf(name, radius, length))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> PlainTable:
         """The body as plain data, with the text of its URDF."""
-        table: dict[str, Any] = {"name": self.name, "urdf": self.urdf_path}
+        table: PlainTable = {"name": self.name, "urdf": self.urdf_path}
         table |= {"urdf_text": self.urdf, "srdf_text": self.srdf}
         return {**table, "package_paths": list(self.package_paths)} if self.package_paths else table
 
     @classmethod
-    def _arguments(cls, data: Mapping[str, Any], folder: Path | None) -> BodyFields:
+    def _arguments(cls, data: StatedTable, folder: Path | None) -> BodyFields:
         """Arguments from a table: read from its URDF file, or from the text that a stored problem carries."""
         optional = ("name", "srdf", "urdf_text", "srdf_text", "package_paths")
         table = checked_table(data, f"a {cls.__name__.lower()}", ("urdf",), optional)
@@ -180,7 +180,7 @@ class Body(Light):
         }
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], folder: Path | None = None) -> Body:
+    def from_dict(cls, data: StatedTable, folder: Path | None = None) -> Body:
         """The body that a problem file or :meth:`to_dict` describes.
 
         Args:

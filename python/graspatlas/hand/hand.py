@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from graspatlas.hand.urdf import (
 )
 from graspatlas.hand.urdf_checks import LARGEST
 from graspatlas.support.arrays import Array
-from graspatlas.support.validation import checked_table, numbers, read_only
+from graspatlas.support.validation import PlainTable, StatedTable, checked_table, numbers, read_only
 
 __all__ = ["Hand"]
 
@@ -115,12 +114,12 @@ class Hand(Body):
         wider = {name: (lower - by, upper + by) for name, (lower, upper) in joint_limits(self.urdf).items()}
         return replace(self, limits={**wider, **self.limits})
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> PlainTable:
         """The hand as plain data, with the text of its URDF."""
         return {**super().to_dict(), "limits": {name: list(pair) for name, pair in self.limits.items()}}
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], folder: Path | None = None) -> Hand:
+    def from_dict(cls, data: StatedTable, folder: Path | None = None) -> Hand:
         """The hand that a problem file or :meth:`to_dict` describes; see :meth:`Body.from_dict`."""
         table = dict(checked_table(data, "a hand", ("urdf",), None))
         stated = checked_table(table.pop("limits", None) or {}, "limits", (), None)

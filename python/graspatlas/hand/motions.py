@@ -5,14 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Integral
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.support.arrays import Array
-from graspatlas.support.validation import checked_instance, checked_table, number, number_array, read_only
+from graspatlas.support.validation import (
+    PlainTable,
+    StatedTable,
+    checked_instance,
+    checked_table,
+    number,
+    number_array,
+    read_only,
+)
 
 __all__ = ["HandMotions", "coupling_rows"]
 
@@ -180,9 +187,9 @@ class HandMotions:
         at = [self.joints.index(name) for name in joints]
         return HandMotions(tuple(joints), self.mean[at], self.covariance[np.ix_(at, at)], self.couplings[:, at])
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> PlainTable:
         """The motions as plain data."""
-        table: dict[str, Any] = {
+        table: PlainTable = {
             "joints": list(self.joints),
             "mean": self.mean.tolist(),
             "covariance": self.covariance.tolist(),
@@ -194,7 +201,7 @@ class HandMotions:
         return {**table, "couplings": rows} if rows else table
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> HandMotions:
+    def from_dict(cls, data: StatedTable) -> HandMotions:
         """The motions that :meth:`to_dict` described."""
         try:
             joints = tuple(data["joints"])

@@ -11,10 +11,9 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 from typing_extensions import Unpack
 
 from graspatlas.atlas.atlas import Atlas
@@ -26,7 +25,9 @@ from graspatlas.optimizer.optimize import optimize
 from graspatlas.optimizer.options import OptimizeOptions, with_defaults
 from graspatlas.problem.problem import Problem
 from graspatlas.result.result import Result
+from graspatlas.result.summary import ResultSummary
 from graspatlas.search.grasp_search import MAX_SINGULAR, GraspSearch
+from graspatlas.support.arrays import Array
 from graspatlas.support.deadlines import deadline_after
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.progress import progress_bar
@@ -34,7 +35,6 @@ from graspatlas.support.validation import whole
 
 __all__ = ["Components", "SearchStatus", "find_components"]
 
-Array = NDArray[np.float64]
 
 #: How far from the nearest polytope a covered grasp may lie, as a share of the radius: atlases have slivers.
 COVERED = 0.5
@@ -52,6 +52,26 @@ class SearchStatus(str, Enum):
 
     def __str__(self) -> str:
         return self.value
+
+
+class ComponentSummary(ResultSummary):
+    """The result of one component, and how many of the grasps found lie in it."""
+
+    hits: int
+
+
+class ComponentsSummary(TypedDict):
+    """The components in plain data."""
+
+    status: str
+    torque_length: float
+    seconds: float
+    tries: int
+    grasps_found: int
+    covered_in_a_row: int
+    holes: int
+    share_not_found: float
+    components: list[ComponentSummary]
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +139,7 @@ class Components:
             raise GraspAtlasError(f"confidence must lie between 0 and 1, got {confidence!r}")
         return float(1.0 - (1.0 - confidence) ** (1.0 / self.covered)) if self.covered else 1.0
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> ComponentsSummary:
         """The components in plain data, as the command line prints them."""
         return {
             "status": str(self.status),

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypedDict
+from typing import Any, TypedDict
 
 from graspatlas.atlas.limits import LimitOptions
-from graspatlas.errors import GraspAtlasError
+from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.problem.problem import Problem
 from graspatlas.quality.batched import Quality, quality_name
-from graspatlas.quality.evaluation import find_index
+from graspatlas.quality.evaluation import INDICES, find_index
 from graspatlas.requirements.base import RequirementLike
 
 __all__ = ["Choices", "OptimizeOptions", "several_indices", "with_defaults"]
@@ -52,11 +52,18 @@ def with_defaults(
     if not isinstance(problem, Problem):
         raise GraspAtlasError(f"problem must be a graspatlas.Problem, got {type(problem).__name__}; see load_problem")
     chosen = {"dimension": dimension, "radius": radius, "epsilon": epsilon, "quality": quality}
-    options = {key: problem.defaults.get(key) if value is None else value for key, value in chosen.items()}
+    options: dict[str, Any] = {
+        key: problem.defaults.get(key) if value is None else value for key, value in chosen.items()
+    }
     missing = [key for key, value in options.items() if value is None]
     if missing:
         raise GraspAtlasError(f"problem '{problem.name}' has no default for {', '.join(missing)}: give optimize these")
-    choices: Choices = options  # type: ignore[assignment]  # a dict of these four keys, none of them None
+    choices: Choices = {
+        "dimension": options["dimension"],
+        "radius": options["radius"],
+        "epsilon": options["epsilon"],
+        "quality": options["quality"],
+    }
     several_indices(choices["quality"])
     return choices
 
@@ -67,7 +74,12 @@ def several_indices(quality: Quality | Sequence[Quality]) -> list[Quality]:
     Raises:
         GraspAtlasError: If there is no such index, one is named twice, or none is.
     """
-    several: list[Quality] = list(quality) if isinstance(quality, list | tuple) else [quality]  # type: ignore[list-item]
+    if isinstance(quality, list | tuple):
+        several: list[Quality] = list(quality)
+    elif isinstance(quality, str) or callable(quality):
+        several = [quality]
+    else:
+        raise unknown_name("quality index", quality, INDICES)
     for one in several:
         find_index(one)
     names = [quality_name(one) for one in several]

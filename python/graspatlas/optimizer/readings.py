@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas import _core
 from graspatlas.atlas.atlas import Atlas
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.callables import is_batched
 from graspatlas.grasps.grasps import Grasps
+from graspatlas.optimizer.options import Choices
 from graspatlas.problem.problem import Problem
 from graspatlas.problem.requirement import StatedRequirement
 from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.quality.evaluation import evaluate
 from graspatlas.requirements.base import RequirementLike
 from graspatlas.requirements.screening import check_requirements, screen
+from graspatlas.result.grasp_atlas import grasp_system
 from graspatlas.result.result import Result
+from graspatlas.support.arrays import Array
 from graspatlas.support.validation import checked_instance, shown
 
 __all__ = ["Reading", "check_atlas_of"]
@@ -58,7 +59,7 @@ class Reading:
             GraspAtlasError: If an index or a requirement fails.
         """
         start = time.perf_counter()
-        grasps = Grasps(problem, atlas.centers, atlas.system, np.arange(atlas.n_charts))  # type: ignore[arg-type]
+        grasps = Grasps(problem, atlas.centers, grasp_system(atlas), np.arange(atlas.n_charts))
         accepted, rejected = screen(self.requirements, grasps)
         first, *others = self.indices
         qualities = evaluate(first, grasps)
@@ -75,7 +76,7 @@ class Reading:
             others=values,
         )
 
-    def try_out(self, problem: Problem, system: _core.GraspSystem, x: NDArray[np.float64]) -> None:
+    def try_out(self, problem: Problem, system: _core.GraspSystem, x: Array) -> None:
         """Ask your own functions about one grasp, so that those that fail do it before the work.
 
         Only functions of one grasp are asked: one that takes a batch may need more than one.
@@ -91,7 +92,7 @@ class Reading:
             if not isinstance(requirement, StatedRequirement) and not is_batched(requirement):
                 screen([requirement], grasp)
 
-    def seconds_each(self, problem: Problem, system: _core.GraspSystem, x: NDArray[np.float64]) -> float:
+    def seconds_each(self, problem: Problem, system: _core.GraspSystem, x: Array) -> float:
         """About how long the reading of a chart takes at most [s]; measured at a grasp x, asked for everything."""
 
         def measured(count: int) -> float:
@@ -108,7 +109,7 @@ class Reading:
         return few / _FEW if few > _SOON else measured(_MANY) / _MANY
 
 
-def check_atlas_of(problem: Problem, options: Mapping[str, Any], atlas: Atlas) -> None:
+def check_atlas_of(problem: Problem, options: Choices, atlas: Atlas) -> None:
     """Make sure that an atlas that is given covers relevant grasps of a problem, from its x1 on.
 
     Args:
@@ -129,10 +130,10 @@ def check_atlas_of(problem: Problem, options: Mapping[str, Any], atlas: Atlas) -
             f"the atlas given has dimension {given[0]} and {given[1]} numbers a grasp; problem '{problem.name}' with "
             f"dimension {dimension} has {mine[0]} and {mine[1]}: give the atlas of the same call"
         )
-    for name in ("radius", "epsilon"):
-        if options[name] != getattr(atlas, name):
+    for name, value in (("radius", options["radius"]), ("epsilon", options["epsilon"])):
+        if value != getattr(atlas, name):
             raise GraspAtlasError(
-                f"the atlas given has {name} {getattr(atlas, name)}, and {shown(options[name])} was asked for: give "
+                f"the atlas given has {name} {getattr(atlas, name)}, and {shown(value)} was asked for: give "
                 f"the atlas of the same call, or {name}=atlas.{name}"
             )
     off = max(float(np.abs(system.evaluate_residual(x)).max(initial=0.0)) for x in atlas.centers)

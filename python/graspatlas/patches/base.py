@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.support.arrays import Array
-from graspatlas.support.validation import number, number_array
+from graspatlas.support.validation import PlainTable, number, number_array
 
 __all__ = ["AxialPatch", "FlippablePatch", "Patch"]
 
@@ -115,7 +115,7 @@ class Patch:
         """Outward unit normal m(u, v) in the body's frame (3,)."""
         return np.asarray(self.core().evaluate(u, v)["m"])
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> PlainTable:
         """The patch as plain data, with its ``type``."""
         return {"type": self.kind, **asdict(self)}
 

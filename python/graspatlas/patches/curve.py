@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +15,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.patches.base import Interval, Patch
 from graspatlas.patches.nearest import nearest_parameters
 from graspatlas.support.arrays import Array
-from graspatlas.support.validation import number_array
+from graspatlas.support.validation import PlainTable, number_array
 
 __all__ = ["Curve"]
 
@@ -100,6 +100,6 @@ class Curve(Patch):
         u, v = (np.ascontiguousarray(spline.c[::-1, :, i].T) for i in range(2))
         return _core.CurvePatch(self.patch.core(), list(spline.x), u, v)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> PlainTable:
         """The curve as plain data, with its patch's."""
         return {"type": self.kind, "patch": self.patch.to_dict(), "points": self.points}

@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +20,9 @@ from graspatlas.patches.spline import BSpline, clamped_knots
 from graspatlas.support.arrays import Array, BoolArray, IntArray
 from graspatlas.support.files import is_file
 from graspatlas.support.validation import whole
+
+if TYPE_CHECKING:
+    import trimesh
 
 __all__ = ["FitReport", "patch_from_mesh"]
 
@@ -65,7 +69,7 @@ class FitReport:
 
 
 def patch_from_mesh(
-    mesh: Any,
+    mesh: str | Path | trimesh.Trimesh,
     center: ArrayLike,
     size: float,
     *,
@@ -132,7 +136,7 @@ def patch_from_mesh(
     return BSpline(control_points=points, u_knots=row, v_knots=row, unit="m"), report
 
 
-def _trimesh() -> Any:
+def _trimesh() -> ModuleType:
     """The optional package trimesh."""
     try:
         return importlib.import_module("trimesh")
@@ -140,7 +144,7 @@ def _trimesh() -> Any:
         raise GraspAtlasError("fitting to a mesh needs trimesh; install it: pip install graspatlas[mesh]") from None
 
 
-def _loaded(mesh: Any) -> tuple[Array, Indices]:
+def _loaded(mesh: str | Path | trimesh.Trimesh) -> tuple[Array, Indices]:
     """Vertices (v, 3) and faces (n, 3) of a mesh, with equal vertices made one."""
     trimesh = _trimesh()
     if isinstance(mesh, str | Path):

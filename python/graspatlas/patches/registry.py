@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Any
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.patches.base import Patch
@@ -13,7 +12,7 @@ from graspatlas.patches.flat import Plane, Point
 from graspatlas.patches.round import Ellipsoid, Sphere, Torus
 from graspatlas.patches.spline import Bezier, BSpline
 from graspatlas.patches.turned import Cone, Cylinder, Revolution
-from graspatlas.support.validation import shown
+from graspatlas.support.validation import StatedTable, shown
 
 __all__ = ["patch_from_dict", "patch_types"]
 
@@ -27,7 +26,7 @@ def patch_types() -> tuple[type[Patch], ...]:
     return _CLASSES
 
 
-def patch_from_dict(data: Mapping[str, Any]) -> Patch:
+def patch_from_dict(data: StatedTable) -> Patch:
     """The patch that :meth:`Patch.to_dict` described.
 
     Args:

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.atlas.atlas import Atlas
 from graspatlas.grasps.grasps import Grasps
@@ -25,16 +24,13 @@ from graspatlas.paths.time_parametrization import URDF, passing_times
 from graspatlas.quality.evaluation import INDICES, evaluate
 from graspatlas.requirements.lost import Lost
 from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.support.arrays import Array, BoolArray, IntArray
 from graspatlas.support.columns import joined, pose_columns
 from graspatlas.support.files import write_csv
 from graspatlas.support.pickling import Light
 from graspatlas.support.renamed import renamed_attribute
 
 __all__ = ["GraspPath", "Path"]
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +114,7 @@ class GraspPath(Path):
         return evaluate(self.result.quality, self.grasps)
 
     @cached_property
-    def accepted(self) -> Flags:
+    def accepted(self) -> BoolArray:
         """Whether each point meets the result's requirements [n].
 
         Raises:

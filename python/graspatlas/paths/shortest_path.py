@@ -13,7 +13,7 @@ from numbers import Integral
 from typing import overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
@@ -22,6 +22,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasp
 from graspatlas.paths.path import GraspPath, Path
 from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.renamed import renamed_keyword
 from graspatlas.support.validation import number_array, positive
@@ -29,8 +30,6 @@ from graspatlas.systems.geodesic import BOUND_TOLERANCE, Allowed, arc_lengths, b
 
 __all__ = ["shortest_path"]
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 #: A chart's number, a grasp, or a point of the manifold.
 End = int | Grasp | ArrayLike
 
@@ -169,7 +168,7 @@ class _End:
             if not 0 <= chart < atlas.n_charts:
                 raise GraspAtlasError(f"{name} {chart} is no chart; the atlas has charts 0 to {atlas.n_charts - 1}")
             return cls(name, atlas.centers[chart], chart, True)
-        x = number_array(value.x if isinstance(value, Grasp) else value, name)  # type: ignore[arg-type]
+        x = number_array(value.x if isinstance(value, Grasp) else value, name)
         size = atlas.system.configuration_size
         if x.shape != (size,):
             raise GraspAtlasError(
@@ -217,7 +216,7 @@ class _ChartGraph:
     """
 
     def __init__(
-        self, atlas: Atlas, open_charts: Flags, ends: list[_End], step: float, allowed: Allowed | None
+        self, atlas: Atlas, open_charts: BoolArray, ends: list[_End], step: float, allowed: Allowed | None
     ) -> None:
         self.atlas, self.ends, self.step, self.allowed = atlas, ends, step, allowed
         pairs = [atlas.neighbour_pairs.astype(np.int64)]

@@ -6,16 +6,15 @@ from collections.abc import Mapping
 from numbers import Real
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.hand import Hand
 from graspatlas.hand.urdf import velocity_limits
+from graspatlas.support.arrays import Array
 from graspatlas.support.validation import shown
 
 __all__ = ["URDF", "passing_times", "speed_limits"]
 
-Array = NDArray[np.float64]
 
 #: Word for the velocity limits of the hand's URDF.
 URDF = "urdf"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +13,7 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.patches.base import Patch
 from graspatlas.patches.registry import patch_from_dict
 from graspatlas.support.arrays import Array
-from graspatlas.support.validation import checked_instance, checked_table, number
+from graspatlas.support.validation import PlainTable, StatedTable, checked_instance, checked_table, number
 
 __all__ = ["Contact", "ContactSide"]
 
@@ -108,7 +107,7 @@ class Contact:
         """Patches and names of the free parameters, in the order in which they stand in x."""
         return [(side.patch, name) for side in self.sides for name in side.free]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> PlainTable:
         """The contact as plain data."""
         return {
             "frame": self.frame,
@@ -119,7 +118,7 @@ class Contact:
         }
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Contact:
+    def from_dict(cls, data: StatedTable) -> Contact:
         """The contact that :meth:`to_dict` described.
 
         Raises:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +14,7 @@ from graspatlas.problem.contact_parameters import touching_parameters
 from graspatlas.problem.contacts import Contact
 from graspatlas.problem.object_joint import ObjectJoint, Quaternion
 from graspatlas.support.arrays import Array
-from graspatlas.support.validation import checked_table, number, number_array, numbers, shown
+from graspatlas.support.validation import PlainTable, StatedTable, checked_table, number, number_array, numbers, shown
 
 __all__ = ["FirstGrasp", "first_grasp_from_array", "first_grasp_to_array", "posture_array", "unit_quaternion"]
 
@@ -52,7 +51,7 @@ class FirstGrasp:
             raise GraspAtlasError(f"x1 holds a number that is not finite, or not below {LARGEST:g}")
         object.__setattr__(self, "object_quat_xyzw", unit_quaternion(self.object_quat_xyzw, "x1"))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> PlainTable:
         """The first grasp as plain data."""
         return {
             "joints": dict(self.joints),
@@ -62,7 +61,7 @@ class FirstGrasp:
         }
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> FirstGrasp:
+    def from_dict(cls, data: StatedTable) -> FirstGrasp:
         """The first grasp that :meth:`to_dict` described.
 
         Raises:

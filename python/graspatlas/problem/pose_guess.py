@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.first_grasp import LARGEST, unit_quaternion
 from graspatlas.problem.object_joint import PLANAR
-from graspatlas.support.validation import checked_table, number_array, numbers
+from graspatlas.support.validation import PlainTable, StatedTable, checked_table, number_array, numbers
 
 __all__ = ["PoseGuess"]
 
@@ -60,13 +59,13 @@ class PoseGuess:
             return distance, 0.0
         return distance, float((rotation * Rotation.from_quat(self.quat_xyzw).inv()).magnitude())
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> PlainTable:
         """The guess as plain data."""
-        table: dict[str, Any] = {"xyz": list(self.xyz)}
+        table: PlainTable = {"xyz": list(self.xyz)}
         return table if self.quat_xyzw is None else {**table, "quat_xyzw": list(self.quat_xyzw)}
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> PoseGuess:
+    def from_dict(cls, data: StatedTable) -> PoseGuess:
         """The guess that :meth:`to_dict` described.
 
         Raises:

@@ -44,7 +44,7 @@ from graspatlas.problem.validation import (
 )
 from graspatlas.support.arrays import Array
 from graspatlas.support.pickling import Light
-from graspatlas.support.validation import checked_table, number, number_array, read_only, shown
+from graspatlas.support.validation import PlainTable, StatedTable, checked_table, number, number_array, read_only, shown
 
 __all__ = ["Problem"]
 
@@ -325,14 +325,17 @@ class Problem(Light):
         """q_joint - multiplier q_driver - offset of the joints that mimic others, at grasps X: (n, m), zero on F."""
         return mimic_residual(self.hand, np.atleast_2d(np.asarray(X, float)))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> PlainTable:
         """The problem as plain data that :meth:`from_dict` reads, with the text of its URDFs."""
-        table: dict[str, Any] = {
+        body: PlainTable = {**self.object.to_dict(), "joint": self.object_joint}
+        if self.pose_guess is not None:
+            body["pose_guess"] = self.pose_guess.to_dict()
+        table: PlainTable = {
             "name": self.name,
             "description": self.description,
             "source": self.source,
             "hand": self.hand.to_dict(),
-            "object": {**self.object.to_dict(), "joint": self.object_joint},
+            "object": body,
             "length_scale": self.length_scale,
             "contacts": [contact.to_dict() for contact in self.contacts],
             "hand_motions": self.motions.to_dict() if self.motions else None,
@@ -345,12 +348,10 @@ class Problem(Light):
             table["torque_length"] = self.torque_length
         if self.reference is not None:
             table["reference"] = dict(self.reference)
-        if self.pose_guess is not None:
-            table["object"]["pose_guess"] = self.pose_guess.to_dict()
         return table
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], folder: Path | None = None) -> Problem:
+    def from_dict(cls, data: StatedTable, folder: Path | None = None) -> Problem:
         """The problem that a problem file or :meth:`to_dict` describes.
 
         Args:

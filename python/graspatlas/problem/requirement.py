@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass, fields
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from graspatlas.errors import GraspAtlasError, unknown_name
-from graspatlas.support.validation import checked_table, shown
+from graspatlas.support.validation import StatedTable, checked_table, shown
 
 __all__ = ["REQUIREMENTS", "StatedRequirement", "parse_requirement", "requirement_from_dict"]
 
@@ -81,7 +81,7 @@ def parse_requirement(text: str) -> StatedRequirement:
         ) from None
 
 
-def requirement_from_dict(data: Mapping[str, Any]) -> StatedRequirement:
+def requirement_from_dict(data: StatedTable) -> StatedRequirement:
     """The requirement that :meth:`StatedRequirement.to_dict` described.
 
     Args:

@@ -8,6 +8,8 @@ from typing import Any
 
 import yaml
 
+from graspatlas.support.validation import Plain, PlainTable
+
 __all__ = ["Document", "DocumentError", "Path", "parse"]
 
 #: Keys and list positions that lead to a field.
@@ -43,6 +45,13 @@ class Document:
     data: Any
     lines: dict[Path, int]
 
+    def at(self, path: Path) -> Any:
+        """The content of a field."""
+        data = self.data
+        for key in path:
+            data = data[key]
+        return data
+
     def line(self, path: Path) -> int:
         """Line of a field, or of the nearest table or list that would hold it."""
         while path and path not in self.lines:
@@ -59,11 +68,11 @@ class _Loader(yaml.SafeLoader):
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012
     _levels = 0
 
-    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         """Read a node, which may hold others, but not without end."""
         self._levels += 1
         if self._levels > MOST_LEVELS:
-            line = self.peek_event().start_mark.line + 1  # type: ignore[no-untyped-call]
+            line = self.peek_event().start_mark.line + 1  # type: ignore[no-untyped-call]  # untyped in types-PyYAML
             raise DocumentError(line, f"has more than {MOST_LEVELS} tables or lists within one another")
         node: yaml.Node | None = super().compose_node(parent, index)
         self._levels -= 1
@@ -111,7 +120,7 @@ class _Reader:
         self.lines: dict[Path, int] = {}
         self._open: list[yaml.Node] = []
 
-    def read(self, node: yaml.Node, path: Path, line: int | None = None) -> Any:
+    def read(self, node: yaml.Node, path: Path, line: int | None = None) -> Plain:
         self.lines[path] = node.start_mark.line + 1 if line is None else line
         if len(self.lines) > MOST_FIELDS:
             raise DocumentError(self.lines[path], f"has more than {MOST_FIELDS} fields")
@@ -126,8 +135,8 @@ class _Reader:
         self._open.pop()
         return data
 
-    def _table(self, node: yaml.MappingNode, path: Path) -> dict[str, Any]:
-        table: dict[str, Any] = {}
+    def _table(self, node: yaml.MappingNode, path: Path) -> PlainTable:
+        table: PlainTable = {}
         for key_node, value_node in node.value:
             line = key_node.start_mark.line + 1
             if not isinstance(key_node, yaml.ScalarNode):
@@ -139,11 +148,11 @@ class _Reader:
             table[key] = self.read(value_node, place, line)
         return table
 
-    def _list(self, node: yaml.Node, path: Path) -> list[Any]:
+    def _list(self, node: yaml.Node, path: Path) -> list[Plain]:
         return [self.read(item, (*path, i)) for i, item in enumerate(node.value)]
 
     @staticmethod
-    def _scalar(node: yaml.ScalarNode, line: int) -> Any:
+    def _scalar(node: yaml.ScalarNode, line: int) -> Plain:
         kind, value = node.tag.removeprefix(_CORE), node.value
         if kind == "str":
             return _text(value, line)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, TypeAlias
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
@@ -14,6 +14,8 @@ from graspatlas.problem_files.documents import Document, Path
 
 __all__ = ["ProblemFileError", "faults_of_validation", "field_name", "narrowed", "one_line"]
 
+#: What pydantic tells of a fault, by its kind.
+Context: TypeAlias = Mapping[str, Any]
 #: What must stand where another type came.
 _KINDS = {
     "float_type": "a number",
@@ -106,7 +108,7 @@ def _message(item: ErrorDetails) -> str:
     return str(item["msg"])
 
 
-def _bound(kind: str, context: Mapping[str, Any]) -> str:
+def _bound(kind: str, context: Context) -> str:
     if kind == "less_than":
         return f"below {context['lt']:g}"
     if kind == "greater_than":
@@ -114,7 +116,7 @@ def _bound(kind: str, context: Mapping[str, Any]) -> str:
     return f"at least {context['ge']:g}"
 
 
-def _length(kind: str, context: Mapping[str, Any]) -> str:
+def _length(kind: str, context: Context) -> str:
     wanted = context["min_length"] if kind == "too_short" else context["max_length"]
     least = "at least " if kind == "too_short" and wanted == 1 else ""
     return f"must hold {least}{wanted} item{'s' if wanted != 1 else ''}, got {context['actual_length']}"
@@ -140,7 +142,7 @@ def narrowed(document: Document, path: Path, message: str) -> tuple[Path, str]:
     if not path:
         path = _subject(document.data, message, first_word=True)
     match = re.match(r"(?:[\w ]+ patch: )?(\w+)(?: of requirement \w+)? (must .*)", message, re.DOTALL)
-    inside = list(_fields(_value(document.data, path), path))
+    inside = list(_fields(document.at(path), path))
     for inner, key, _ in inside:
         if match and key == match[1]:
             return inner, match[2]
@@ -157,12 +159,6 @@ def _subject(data: Mapping[str, object], message: str, *, first_word: bool) -> P
     words = re.findall(r"\w+", text)[: 1 if first_word else None]
     named = [(words.index(key), key) for key in data if key in words and key not in _PROSE]
     return (min(named)[1],) if named else ()
-
-
-def _value(data: Any, path: Path) -> Any:
-    for key in path:
-        data = data[key]
-    return data
 
 
 def _fields(data: object, path: Path) -> Iterator[tuple[Path, str | int, object]]:

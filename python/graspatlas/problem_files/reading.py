@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
@@ -60,16 +59,10 @@ def read_problem(text: str, file: str = "problem.yaml", folder: Path | None = No
 
 def _check_filled_in(file: str, document: documents.Document) -> None:
     """Name what a template leaves to the user."""
-    blanks = [path for path in document.lines if _at(document.data, path) == FILL_IN]
+    blanks = [path for path in document.lines if document.at(path) == FILL_IN]
     if blanks:
         message = "is still to be filled in; the comment beside it says with what"
         raise ProblemFileError([one_line(file, document, path, message) for path in blanks])
-
-
-def _at(data: Any, path: documents.Path) -> Any:
-    for key in path:
-        data = data[key]
-    return data
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from graspatlas.patches.registry import patch_types
 from graspatlas.problem.requirement import REQUIREMENTS
 from graspatlas.problem_files.schema_tables import Finite, Table, exactly_one, known_name, table_of
 from graspatlas.quality.evaluation import INDICES
+from graspatlas.support.validation import PlainTable
 
 __all__ = ["ProblemTable", "json_schema"]
 
@@ -166,7 +167,7 @@ class DefaultsTable(Table):
     """Quality index."""
 
 
-def _patch_table() -> Any:
+def _patch_table() -> object:
     """A patch of any type; those that lie on another patch lie on one that does not."""
     on_patch = {cls for cls in patch_types() if Patch in get_type_hints(cls).values()}
     plain = [_typed(cls, None) for cls in patch_types() if cls not in on_patch]
@@ -174,15 +175,15 @@ def _patch_table() -> Any:
     return _one_of(tables)
 
 
-def _one_of(tables: list[type[Table]]) -> Any:
+def _one_of(tables: list[type[Table]]) -> object:
     return Annotated[Union[tuple(tables)], Field(discriminator="type")]  # noqa: UP007
 
 
-def _typed(cls: Any, patch: Any) -> type[Table]:
+def _typed(cls: type[Patch], patch: object) -> type[Table]:
     return table_of(cls, patch=patch, type=(Literal[cls.kind], ...))
 
 
-def _with_values(value: Any) -> Any:
+def _with_values(value: object) -> object:
     """A requirement by its name alone has its default values."""
     if isinstance(value, str):
         return {value: {}}
@@ -191,7 +192,7 @@ def _with_values(value: Any) -> Any:
     return value
 
 
-def _requirement_table() -> Any:
+def _requirement_table() -> object:
     tables: dict[str, Any] = {
         name: (table_of(requirement) | None, Field(None, description=(requirement.__doc__ or "").partition("\n")[0]))
         for name, requirement in REQUIREMENTS.items()
@@ -201,6 +202,7 @@ def _requirement_table() -> Any:
     return Annotated[table, BeforeValidator(_with_values, json_schema_input_type=stated)]
 
 
+# Annotations made at run time, which a type checker cannot read.
 PatchTable: Any = _patch_table()
 RequirementTable: Any = _requirement_table()
 
@@ -252,7 +254,7 @@ class ProblemTable(Table):
     """What the best grasp must meet when the caller does not say."""
 
 
-def json_schema() -> dict[str, Any]:
+def json_schema() -> PlainTable:
     """JSON Schema of problem files, for editors."""
     schema = ProblemTable.model_json_schema()
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "graspatlas problem"}

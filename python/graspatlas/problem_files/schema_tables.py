@@ -25,7 +25,7 @@ class Table(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _known_fields(cls, data: Any) -> Any:
+    def _known_fields(cls, data: object) -> object:
         for name in data if isinstance(data, Mapping) else ():
             if name not in cls.model_fields:
                 message = str(unknown_name("field", name, cls.model_fields))
@@ -47,7 +47,7 @@ def exactly_one(table: Table, names: Iterable[str], what: str) -> None:
 def known_name(kind: str, names: Callable[[], Iterable[str]]) -> BeforeValidator:
     """A check that a text is one of some names, with the nearest one in the message."""
 
-    def check(value: Any) -> Any:
+    def check(value: object) -> object:
         known = list(names())
         if isinstance(value, str) and value not in known:
             raise PydanticCustomError("unknown_name", "{message}", {"message": str(unknown_name(kind, value, known))})
@@ -56,7 +56,7 @@ def known_name(kind: str, names: Callable[[], Iterable[str]]) -> BeforeValidator
     return BeforeValidator(check)
 
 
-def list_like(annotation: Any, patch: Any = None) -> Any:
+def list_like(annotation: object, patch: object = None) -> object:
     """The type of a dataclass's attribute as a file states it: lists for tuples.
 
     Args:
@@ -77,7 +77,7 @@ def list_like(annotation: Any, patch: Any = None) -> Any:
     return patch or Any
 
 
-def table_of(cls: type, *, patch: Any = None, **more: Any) -> type[Table]:
+def table_of(cls: type, *, patch: object = None, **more: object) -> type[Table]:
     """A table with the attributes of a dataclass.
 
     Args:
@@ -99,7 +99,7 @@ def table_of(cls: type, *, patch: Any = None, **more: Any) -> type[Table]:
     return create_model(name, __base__=Table, __doc__=(cls.__doc__ or "").partition("\n")[0], **attributes)
 
 
-def _plain(default: Any) -> Any:
+def _plain(default: object) -> object:
     """A default as JSON can state it: an infinite interval is none."""
     if isinstance(default, tuple):
         plain = [_plain(item) for item in default]

@@ -12,13 +12,17 @@ It cannot write to the arrays that it gets::
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import SupportsFloat, TypeVar
+
+from numpy.typing import ArrayLike
+
+from graspatlas.grasps.grasps import Grasp, Grasps
 
 __all__ = ["Quality", "batched", "quality_name"]
 
 #: A quality index: the name of one of the package's, or a function of grasps; see the top of this module.
-Quality = str | Callable[[Any], Any]
-F = TypeVar("F", bound=Callable[..., Any])
+Quality = str | Callable[[Grasp], SupportsFloat] | Callable[[Grasps], ArrayLike]
+F = TypeVar("F", bound=Callable[..., object])
 
 
 def batched(index: F) -> F:

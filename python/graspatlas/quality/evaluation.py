@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from graspatlas.errors import GraspAtlasError, unknown_name
-from graspatlas.grasps.callables import called_numbers
+from graspatlas.grasps.callables import GraspFunction, called_numbers
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.quality.force_closure import force_closure_margin
@@ -49,7 +48,7 @@ INDICES: dict[str, Callable[[Grasps], Array]] = {
 _OWN = tuple(INDICES.values())
 
 
-def find_index(quality: Quality) -> Callable[[Any], Any]:
+def find_index(quality: Quality) -> GraspFunction:
     """The index of a name, or the callable itself.
 
     Raises:

@@ -14,17 +14,16 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.problem.problem import Problem
 from graspatlas.quality.evaluation import evaluate
 from graspatlas.result.result import Result
+from graspatlas.support.arrays import Array
 
 __all__ = ["Multistart", "multistart"]
 
-Array = NDArray[np.float64]
 
 #: What counts as feasible: largest residual, and how far a bound may be broken.
 FEASIBLE = 1e-6

@@ -98,7 +98,7 @@ def add_components(section: Section, setting: Setting, result: Result) -> None:
 
 def add_holding_of_best(section: Section, result: Result) -> None:
     """Whether the best grasp collides, and how many grasps are force-closed."""
-    grasps = Grasps(result.problem, result.atlas.centers, result.atlas.system)  # type: ignore[arg-type]
+    grasps = Grasps(result.problem, result.atlas.centers, result.system)
     closed = int(ForceClosure(FRICTION).met(grasps).sum())
     free = CollisionFree().met(grasps)
     depth = -1e3 * float(CollisionChecker(result.problem).clearances(result.best.x[None]).min())
@@ -129,7 +129,7 @@ def add_holding_of_best(section: Section, result: Result) -> None:
 def holding(result: Result) -> Result:
     """The same result when a grasp must be force-closed and free of collision."""
     requirements = (ForceClosure(FRICTION), CollisionFree())
-    grasps = Grasps(result.problem, result.atlas.centers, result.atlas.system)  # type: ignore[arg-type]
+    grasps = Grasps(result.problem, result.atlas.centers, result.system)
     accepted, rejected = screen(requirements, grasps)
     return replace(result, requirements=requirements, accepted=accepted, rejected=rejected)
 

@@ -7,7 +7,6 @@ from html import escape
 from importlib import resources
 from itertools import groupby
 from string import Template
-from typing import Any
 
 from graspatlas.reproduce.climbing import MAX_STEPS, SEED, STARTS
 from graspatlas.reproduce.published import MACHINE
@@ -28,7 +27,7 @@ OVERVIEW = {
 }
 
 
-def page(sections: Sequence[Section], machine: Mapping[str, Any], seconds: Mapping[str, float]) -> str:
+def page(sections: Sequence[Section], machine: Mapping[str, str | int], seconds: Mapping[str, float]) -> str:
     """The page's text.
 
     Args:

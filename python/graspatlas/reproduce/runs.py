@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 from graspatlas.analysis.peaks import local_maxima
 from graspatlas.atlas.status import Status
@@ -69,45 +68,55 @@ def numbers_of(result: Result, setting: Setting, label: str = "") -> list[Number
     """
     paper = PUBLISHED[setting.problem, setting.dimension]
     rows = [*_sizes(result, setting, paper), *_times(result, paper), *_qualities(result, setting)]
-    return [Number(label, *row) for row in rows]
+    return [replace(row, run=label) for row in rows]
 
 
-def _sizes(result: Result, setting: Setting, paper: Published) -> Iterator[tuple[Any, ...]]:
+def _sizes(result: Result, setting: Setting, paper: Published) -> Iterator[Number]:
     problem, k = result.problem, setting.dimension
     full = problem.full_system
     planar = problem.object_joint_model.planar
-    yield "variables of F", paper.variables, full.tangent_size, "", WHY["variables"]
-    yield "equations of F", paper.equations, full.n_equations, "", WHY["equations"]
-    yield "dimension t of feasible grasps", paper.full_dimension, problem.full_dimension
+    yield Number("", "variables of F", paper.variables, full.tangent_size, "", WHY["variables"])
+    yield Number("", "equations of F", paper.equations, full.n_equations, "", WHY["equations"])
+    yield Number("", "dimension t of feasible grasps", paper.full_dimension, problem.full_dimension)
     s = problem.frozen_motions(k)
-    yield "frozen hand motions s", paper.frozen_motions, s
+    yield Number("", "frozen hand motions s", paper.frozen_motions, s)
     if problem.motions is not None:
         kept = 100.0 * problem.motions.variance_kept(s)
-        yield "variance of the hand motions that is kept", paper.kept, kept, "%", WHY["kept"] if paper.kept else ""
-    yield "dimension k of relevant grasps", paper.dimension, result.dimension
+        yield Number(
+            "", "variance of the hand motions that is kept", paper.kept, kept, "%", WHY["kept"] if paper.kept else ""
+        )
+    yield Number("", "dimension k of relevant grasps", paper.dimension, result.dimension)
     same = paper.radius == setting.radius
-    yield "radius r of a chart", paper.radius, setting.radius, "", "" if same else WHY["radius"]
-    yield "epsilon", paper.epsilon, setting.epsilon
-    yield "charts", paper.charts, result.atlas.n_charts, "", WHY["charts of the planar hand" if planar else "charts"]
-    yield "atlas", None, str(result.status)
+    yield Number("", "radius r of a chart", paper.radius, setting.radius, "", "" if same else WHY["radius"])
+    yield Number("", "epsilon", paper.epsilon, setting.epsilon)
+    yield Number(
+        "", "charts", paper.charts, result.atlas.n_charts, "", WHY["charts of the planar hand" if planar else "charts"]
+    )
+    yield Number("", "atlas", None, str(result.status))
 
 
-def _times(result: Result, paper: Published) -> Iterator[tuple[Any, ...]]:
+def _times(result: Result, paper: Published) -> Iterator[Number]:
     atlas, index = result.atlas.seconds, result.quality_seconds
     if paper.total_seconds is not None:
-        yield "time for atlas and index", paper.total_seconds, atlas + index, "s", WHY["atlas time"]
-    yield "time for the atlas", paper.atlas_seconds, atlas, "s", WHY["atlas time"] if paper.atlas_seconds else ""
-    yield "time for the index", paper.index_seconds, index, "s", WHY["index time"] if paper.index_seconds else ""
+        yield Number("", "time for atlas and index", paper.total_seconds, atlas + index, "s", WHY["atlas time"])
+    yield Number(
+        "", "time for the atlas", paper.atlas_seconds, atlas, "s", WHY["atlas time"] if paper.atlas_seconds else ""
+    )
+    yield Number(
+        "", "time for the index", paper.index_seconds, index, "s", WHY["index time"] if paper.index_seconds else ""
+    )
 
 
-def _qualities(result: Result, setting: Setting) -> Iterator[tuple[Any, ...]]:
+def _qualities(result: Result, setting: Setting) -> Iterator[Number]:
     scaled = with_index(result, setting.quality)
     index = setting.quality.replace("_", " ")
     n_singular = int((scaled.qualities < SINGULAR_BELOW[setting.quality]).sum())
     unit = f"{1e3 * result.problem.length_scale:g} mm" if result.problem.object_joint_model.planar else "mm"
-    yield f"best {index}, lengths in {unit}", None, result.best.quality
-    yield f"worst {index}, lengths in {unit}", None, result.worst.quality
-    yield "index at the first grasp", None, float(result.qualities[0])
-    yield f"singular charts (below {SINGULAR_BELOW[setting.quality]:g}, lengths in length scales)", None, n_singular
-    yield "local maxima on the graph of charts", None, len(local_maxima(result))
-    yield "largest residual of a chart centre", None, float(result.atlas.residuals.max())
+    yield Number("", f"best {index}, lengths in {unit}", None, result.best.quality)
+    yield Number("", f"worst {index}, lengths in {unit}", None, result.worst.quality)
+    yield Number("", "index at the first grasp", None, float(result.qualities[0]))
+    yield Number(
+        "", f"singular charts (below {SINGULAR_BELOW[setting.quality]:g}, lengths in length scales)", None, n_singular
+    )
+    yield Number("", "local maxima on the graph of charts", None, len(local_maxima(result)))
+    yield Number("", "largest residual of a chart centre", None, float(result.atlas.residuals.max()))

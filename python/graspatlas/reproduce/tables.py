@@ -6,7 +6,6 @@ import csv
 import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
 
 from graspatlas.reproduce.report import Section
 
@@ -15,7 +14,7 @@ __all__ = ["to_csv", "to_json"]
 COLUMNS = ("experiment", "run", "quantity", "paper", "here", "unit", "why")
 
 
-def _rows(sections: Sequence[Section]) -> Iterator[dict[str, Any]]:
+def _rows(sections: Sequence[Section]) -> Iterator[dict[str, str | float | int | None]]:
     for section in sections:
         for n in section.numbers:
             values = (section.name, n.run, n.quantity, n.paper, n.ours, n.unit, n.why)
@@ -32,7 +31,7 @@ def to_csv(sections: Sequence[Section]) -> str:
     return stream.getvalue()
 
 
-def to_json(sections: Sequence[Section], machine: Mapping[str, Any]) -> str:
+def to_json(sections: Sequence[Section], machine: Mapping[str, str | int]) -> str:
     """The same numbers, what was found about the paper's claims, and what they were measured on."""
     data = {
         "format": "graspatlas report",

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.callables import called_flags
-from graspatlas.grasps.grasps import Grasps
+from graspatlas.grasps.grasps import Grasp, Grasps
 from graspatlas.problem.requirement import StatedRequirement
 from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.support.validation import shown
@@ -50,7 +52,7 @@ class Requirement(StatedRequirement):
 
 
 #: What may be required of grasps: a named requirement, or a function of a grasp; see the top of this module.
-RequirementLike = StatedRequirement | Callable[[Any], Any]
+RequirementLike = StatedRequirement | Callable[[Grasp], bool | np.bool_] | Callable[[Grasps], ArrayLike]
 
 
 def requirement_name(requirement: RequirementLike | str) -> str:

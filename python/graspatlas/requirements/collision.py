@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.mesh_files import check_meshes
 from graspatlas.requirements.collision_shapes import Shape, convex_hull, convex_solid, read_shapes, thinner
-from graspatlas.support.arrays import Array, BoolArray
+from graspatlas.support.arrays import Array, BoolArray, Int32Array
 from graspatlas.support.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ class CollisionChecker:
             )
         return np.ascontiguousarray(rows[:, : self._size])
 
-    def _chosen(self, pairs: ArrayLike | None) -> NDArray[np.int32]:
+    def _chosen(self, pairs: ArrayLike | None) -> Int32Array:
         return np.arange(len(self.pairs), dtype=np.int32) if pairs is None else np.asarray(pairs, np.int32)
 
 

@@ -13,13 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from graspatlas import _core
 from graspatlas.requirements.hulls import MANY_POINTS, corners_of_hull, mesh_volume, shallow_volume
-from graspatlas.support.arrays import Array
+from graspatlas.support.arrays import Array, Int32Array
 
 __all__ = ["Shape", "convex_hull", "convex_solid", "read_shapes", "thinner"]
 
@@ -48,7 +47,7 @@ class Shape:
     kind: str
     sizes: Sequence[float] = (0.0, 0.0, 0.0)
     points: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    triangles: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 3), np.int32))
+    triangles: Int32Array = field(default_factory=lambda: np.zeros((0, 3), np.int32))
     name: str = ""
     link: str = ""
     joint: int = 0
@@ -61,7 +60,7 @@ class Shape:
         """True for a mesh that counts as triangles, not as a convex solid."""
         return self.kind == "mesh"
 
-    def as_tuple(self) -> tuple[str, str, Sequence[float], Array, NDArray[np.int32], int, Array]:
+    def as_tuple(self) -> tuple[str, str, Sequence[float], Array, Int32Array, int, Array]:
         """The shape as the core takes it."""
         return self.name, self.kind, self.sizes, self.points, self.triangles, self.joint, self.placement
 

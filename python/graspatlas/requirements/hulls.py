@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from graspatlas import _core
-from graspatlas.support.arrays import Array
+from graspatlas.support.arrays import Array, IndexArray, Int32Array
 
 __all__ = ["corners_of_hull", "mesh_volume", "shallow_volume"]
 
@@ -54,7 +53,7 @@ def corners_of_hull(points: Array) -> tuple[Array, float]:
     return points[chosen], float(distances.max())
 
 
-def _chosen(points: Array) -> NDArray[np.intp]:
+def _chosen(points: Array) -> IndexArray:
     """Numbers of the corners of a hull above the faces of which no point is high, of a sample of the points."""
     chosen, waiting = _outermost(points), np.arange(0, len(points), 1 + len(points) // MANY_POINTS)
     while True:
@@ -66,12 +65,12 @@ def _chosen(points: Array) -> NDArray[np.intp]:
         chosen = np.union1d(chosen, more)
 
 
-def _corners(points: Array, chosen: NDArray[np.intp]) -> NDArray[np.intp]:
+def _corners(points: Array, chosen: IndexArray) -> IndexArray:
     """Those of the chosen points that are corners of their hull."""
     return np.asarray(chosen[ConvexHull(points[chosen]).vertices], np.intp)
 
 
-def _outermost(points: Array) -> NDArray[np.intp]:
+def _outermost(points: Array) -> IndexArray:
     """Numbers of the points that are outermost along the axes and the diagonals of a cube."""
     steps = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3)).reshape(3, -1).T
     found = np.unique((points @ steps[np.abs(steps).sum(axis=1) > 0.0].T).argmax(axis=0))
@@ -82,7 +81,7 @@ def _outermost(points: Array) -> NDArray[np.intp]:
     return np.asarray(found, np.intp)
 
 
-def _above(points: Array, planes: Array) -> tuple[Array, NDArray[np.intp]]:
+def _above(points: Array, planes: Array) -> tuple[Array, IndexArray]:
     """Height of each point above the plane that it is highest above (n,), negative inside, and that plane (n,)."""
     heights, highest = np.empty(len(points)), np.empty(len(points), np.intp)
     step = max(1, AT_A_TIME // len(planes))
@@ -93,7 +92,7 @@ def _above(points: Array, planes: Array) -> tuple[Array, NDArray[np.intp]]:
     return heights, highest
 
 
-def _farthest(points: Array, waiting: NDArray[np.intp], planes: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _farthest(points: Array, waiting: IndexArray, planes: Array) -> tuple[IndexArray, IndexArray]:
     """Which of the waiting points still lie above faces, and of these the one that is highest above each face."""
     heights, highest = _above(points[waiting], planes)
     left = heights > ENOUGH
@@ -103,13 +102,13 @@ def _farthest(points: Array, waiting: NDArray[np.intp], planes: Array) -> tuple[
     return waiting, waiting[order[last]]
 
 
-def mesh_volume(points: Array, triangles: NDArray[np.int32]) -> float:
+def mesh_volume(points: Array, triangles: Int32Array) -> float:
     """Volume that a closed mesh encloses [m^3]."""
     a, b, c = (points[corners] - points.mean(axis=0) for corners in triangles.T)
     return float(abs(np.einsum("nc,nc->n", np.cross(a, b), c).sum())) / 6.0
 
 
-def shallow_volume(points: Array, triangles: NDArray[np.int32], planes: Array) -> float:
+def shallow_volume(points: Array, triangles: Int32Array, planes: Array) -> float:
     """Volume between a mesh and the planes of a hull round it, where they are close [m^3]; from a sample."""
     step = 1 + len(triangles) // MANY_POINTS
     a, b, c = (points[corners] for corners in triangles[::step].T)

@@ -8,10 +8,10 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
+from typing_extensions import Unpack
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.columns import contact_columns, grasp_columns
@@ -21,19 +21,28 @@ from graspatlas.quality.batched import quality_name
 from graspatlas.quality.evaluation import INDICES, evaluate
 from graspatlas.requirements.base import requirement_name
 from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.support.arrays import AnyArray, Array, BoolArray, IntArray
 from graspatlas.support.columns import joined
 from graspatlas.support.files import replaced, write_csv
-from graspatlas.support.validation import whole
+from graspatlas.support.validation import PlainTable, whole
 from graspatlas.version import __version__
 
 __all__ = ["ENDINGS", "FORMAT", "FORMAT_VERSION", "Selection", "save_grasps", "select"]
 
-Array = NDArray[np.float64]
 
 #: What a file of grasps may end in.
 ENDINGS = (".csv", ".json")
 FORMAT = "graspatlas grasps"
 FORMAT_VERSION = 2
+
+
+class Choice(TypedDict, total=False):
+    """Arguments of :func:`select`."""
+
+    charts: Sequence[int] | None
+    best: int | None
+    accepted: bool
+    refined: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,17 +58,17 @@ class Selection:
     """
 
     grasps: Grasps
-    charts: NDArray[np.int64]
-    refined: NDArray[np.bool_]
-    accepted: NDArray[np.bool_]
+    charts: IntArray
+    refined: BoolArray
+    accepted: BoolArray
     indices: dict[str, Array]
 
-    def columns(self) -> dict[str, Any]:
+    def columns(self) -> dict[str, AnyArray]:
         """Columns of a flat table: chart, flags, indices, joints, poses and contacts."""
         flags = {"chart": self.charts, "refined": self.refined, "accepted": self.accepted}
         return joined(flags, self.indices, grasp_columns(self.grasps), contact_columns(self.grasps))
 
-    def records(self) -> list[dict[str, Any]]:
+    def records(self) -> list[PlainTable]:
         """One table a grasp, as the JSON file has it."""
         grasps = self.grasps
         joints = np.array(list(grasps.joint_positions.values())).T.tolist()
@@ -122,7 +131,7 @@ def select(
     )
 
 
-def _best(result: GraspAtlas, count: int) -> NDArray[np.int64]:
+def _best(result: GraspAtlas, count: int) -> IntArray:
     """The best charts that meet the requirements, the best first; of equals the first."""
     whole(count, "best")
     candidates = result.candidates()
@@ -139,7 +148,7 @@ def _at(result: GraspAtlas, x: Array, name: str) -> Array:
     return evaluate(name, Grasps(result.problem, x, system))
 
 
-def save_grasps(result: GraspAtlas, path: str | os.PathLike[str], **choice: Any) -> int:
+def save_grasps(result: GraspAtlas, path: str | os.PathLike[str], **choice: Unpack[Choice]) -> int:
     """Write grasps of a result; see :meth:`graspatlas.Result.save_grasps`.
 
     Args:
@@ -164,7 +173,7 @@ def save_grasps(result: GraspAtlas, path: str | os.PathLike[str], **choice: Any)
     return len(selection.grasps)
 
 
-def _header(result: GraspAtlas, selection: Selection) -> dict[str, Any]:
+def _header(result: GraspAtlas, selection: Selection) -> PlainTable:
     """What holds for all grasps of a file."""
     problem = result.problem
     return {

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.atlas.atlas import LARGEST, Atlas
 from graspatlas.atlas.status import Audit, Status
@@ -22,8 +20,9 @@ from graspatlas.requirements.lost import Lost
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.result.refinement import Refinement
 from graspatlas.support.archives import DamagedArchive, read_arrays
+from graspatlas.support.arrays import AnyArray, Array, BoolArray
 from graspatlas.support.files import is_folder, opened, replaced, stated_path
-from graspatlas.support.validation import number, shown
+from graspatlas.support.validation import StatedTable, number, shown
 
 __all__ = ["read_result", "save_result"]
 
@@ -34,6 +33,21 @@ UNIT_TOLERANCE = 1e-6
 
 _REFINEMENT_FLAGS = ("all_motions", "complete")
 _REFINEMENT_ARRAYS = tuple(f.name for f in fields(Refinement) if f.name not in _REFINEMENT_FLAGS)
+
+
+class Parts(TypedDict):
+    """The attributes of a result."""
+
+    problem: Problem
+    atlas: Atlas
+    quality: str
+    qualities: Array
+    quality_seconds: float
+    requirements: tuple[RequirementLike, ...]
+    accepted: BoolArray
+    rejected: dict[str, int]
+    others: dict[str, Array]
+    refinement: Refinement | None
 
 
 def save_result(result: GraspAtlas, path: str | os.PathLike[str]) -> None:
@@ -63,7 +77,7 @@ def save_result(result: GraspAtlas, path: str | os.PathLike[str]) -> None:
         "rejected": dict(result.rejected),
         "others": list(result.others),
     }
-    extra: dict[str, Any] = {f"other_{i}": values for i, values in enumerate(result.others.values())}
+    extra: dict[str, AnyArray] = {f"other_{i}": values for i, values in enumerate(result.others.values())}
     if result.refinement is not None:
         header["refinement"] = {name: getattr(result.refinement, name) for name in _REFINEMENT_FLAGS}
         extra |= {f"refined_{name}": getattr(result.refinement, name) for name in _REFINEMENT_ARRAYS}
@@ -77,7 +91,7 @@ def save_result(result: GraspAtlas, path: str | os.PathLike[str]) -> None:
         )
 
 
-def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
+def read_result(path: str | os.PathLike[str]) -> Parts:
     """The attributes of a result that was saved; see :func:`graspatlas.load_result`.
 
     Args:
@@ -109,7 +123,7 @@ def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
     return _parts(header, arrays, source)
 
 
-def _read(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, Any]]:
+def _read(stream: BinaryIO) -> tuple[StatedTable, dict[str, AnyArray]]:
     """Header and arrays of a result file."""
     arrays = read_arrays(stream)
     header = json.loads(str(arrays.pop("header")))
@@ -119,7 +133,7 @@ def _read(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, Any]]:
     return header, arrays
 
 
-def _parts(header: Mapping[str, Any], arrays: dict[str, Any], source: os.PathLike[str]) -> dict[str, Any]:
+def _parts(header: StatedTable, arrays: dict[str, AnyArray], source: os.PathLike[str]) -> Parts:
     """Attributes of a result, once all of them are sound."""
     try:
         problem = _with_torque_length(Problem.from_dict(header["problem"]), header)
@@ -161,7 +175,7 @@ def _parts(header: Mapping[str, Any], arrays: dict[str, Any], source: os.PathLik
         raise GraspAtlasError(f"result '{source}' is damaged ({shown(error)}); compute it again") from None
 
 
-def _audit(table: Mapping[str, Any]) -> Audit:
+def _audit(table: StatedTable) -> Audit:
     """The audit of an atlas."""
     points, holes = (int(number(table[name], name)) for name in ("points", "holes"))
     seconds = number(table["seconds"], "seconds")
@@ -170,7 +184,7 @@ def _audit(table: Mapping[str, Any]) -> Audit:
     return Audit(points, holes, seconds)
 
 
-def _check_header(header: Mapping[str, Any], atlas: Atlas) -> None:
+def _check_header(header: StatedTable, atlas: Atlas) -> None:
     """Make sure that numbers and names of a header are ones that a result can have.
 
     Raises:
@@ -187,7 +201,7 @@ def _check_header(header: Mapping[str, Any], atlas: Atlas) -> None:
         raise GraspAtlasError(f"quality must be the name of an index, got {shown(header['quality'])}")
 
 
-def check_configurations(problem: Problem, X: NDArray[np.float64], what: str) -> None:
+def check_configurations(problem: Problem, X: Array, what: str) -> None:
     """Make sure that configurations name one each: quaternions, cosines and sines have length one.
 
     Args:
@@ -211,13 +225,13 @@ def check_configurations(problem: Problem, X: NDArray[np.float64], what: str) ->
             raise GraspAtlasError(f"{name} has length {lengths[off[0]]:g}, not 1, at {what} {off[0]}")
 
 
-def _with_torque_length(problem: Problem, header: Mapping[str, Any]) -> Problem:
+def _with_torque_length(problem: Problem, header: StatedTable) -> Problem:
     """The problem with the torque length that the result was computed with, should another one be found today."""
     length = number(header["torque_length"], "torque_length")
     return problem if length in (problem.torque_arm, 0.0) else replace(problem, torque_length=length)
 
 
-def _refinement(flags: Mapping[str, Any] | None, arrays: dict[str, Any], problem: Problem) -> Refinement | None:
+def _refinement(flags: StatedTable | None, arrays: dict[str, AnyArray], problem: Problem) -> Refinement | None:
     """The refinement of a result file, taken out of its arrays."""
     if flags is None:
         return None
@@ -232,7 +246,7 @@ def _refinement(flags: Mapping[str, Any] | None, arrays: dict[str, Any], problem
     return Refinement(**parts, all_motions=bool(flags["all_motions"]), complete=bool(flags["complete"]))
 
 
-def _sound(name: str, array: Any) -> bool:
+def _sound(name: str, array: AnyArray) -> bool:
     """Whether all numbers are finite; qualities that run away may be infinite."""
     return bool((~np.isnan(array) if name == "qualities" else np.isfinite(array)).all())
 

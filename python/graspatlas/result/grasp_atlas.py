@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from typing_extensions import Self
 
 from graspatlas import _core
@@ -21,12 +21,24 @@ from graspatlas.quality.evaluation import evaluate
 from graspatlas.requirements.base import RequirementLike
 from graspatlas.requirements.screening import screen
 from graspatlas.result.refinement import Refinement
-from graspatlas.support.arrays import Array, BoolArray
+from graspatlas.support.arrays import Array, BoolArray, IndexArray
 from graspatlas.support.pickling import Light
 from graspatlas.support.renamed import renamed_attribute
 from graspatlas.support.validation import read_only
 
-__all__ = ["GraspAtlas"]
+__all__ = ["GraspAtlas", "grasp_system"]
+
+
+def grasp_system(atlas: Atlas) -> _core.GraspSystem:
+    """System R(x) = 0 of an atlas of grasps.
+
+    Raises:
+        GraspAtlasError: If the atlas is one of anything else.
+    """
+    system = atlas.system
+    if not isinstance(system, _core.GraspSystem):
+        raise GraspAtlasError(f"the atlas must be one of grasps, got one of a {type(system).__name__}")
+    return system
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,10 +99,7 @@ class GraspAtlas(Light):
         Raises:
             GraspAtlasError: If the atlas is not one of grasps.
         """
-        system = self.atlas.system
-        if not isinstance(system, _core.GraspSystem):
-            raise GraspAtlasError(f"the atlas must be one of grasps, got one of a {type(system).__name__}")
-        return system
+        return grasp_system(self.atlas)
 
     @property
     def is_global(self) -> bool:
@@ -121,7 +130,7 @@ class GraspAtlas(Light):
         candidates = self.candidates()
         return self.grasp(int(candidates[np.argmin(self.qualities[candidates])]))
 
-    def candidates(self) -> NDArray[np.intp]:
+    def candidates(self) -> IndexArray:
         """Charts that meet the requirements, ascending; at least one.
 
         Raises:

@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-import numpy as np
-from numpy.typing import NDArray
+from graspatlas.support.arrays import Array, BoolArray, IntArray
 
 __all__ = ["PeakStatus", "Refinement"]
-
-Array = NDArray[np.float64]
 
 
 class PeakStatus(str, Enum):
@@ -43,10 +40,10 @@ class Refinement:
 
     x: Array
     qualities: Array
-    starts: NDArray[np.int64]
-    converged: NDArray[np.bool_]
-    unbounded: NDArray[np.bool_]
-    steps: NDArray[np.int64]
+    starts: IntArray
+    converged: BoolArray
+    unbounded: BoolArray
+    steps: IntArray
     all_motions: bool
     complete: bool
 

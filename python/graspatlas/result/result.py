@@ -5,10 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from graspatlas.atlas.verification import CheckReport
 from graspatlas.grasps.columns import grasp_columns, parameter_columns
@@ -17,6 +14,7 @@ from graspatlas.quality.batched import quality_name
 from graspatlas.result.exports import save_grasps
 from graspatlas.result.files import read_result, save_result
 from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.result.summary import GraspSummary, OtherSummary, RefinementSummary, ResultSummary
 from graspatlas.result.verification import check_result
 from graspatlas.support.columns import joined, to_frame
 from graspatlas.support.renamed import renamed_keyword
@@ -25,8 +23,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 __all__ = ["Result", "load_result"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -94,11 +90,11 @@ class Result(GraspAtlas):
         """Verify every chart again, from the problem alone; see :func:`graspatlas.result.verification.check_result`."""
         return check_result(self)
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> ResultSummary:
         """The result in plain data, as the command line prints it; best is None where no grasp meets requirements."""
         atlas = self.atlas
         best, worst = (self.best, self.worst) if self.accepted.any() else (None, None)
-        return {
+        summary: ResultSummary = {
             "problem": self.problem.name,
             "dimension": self.dimension,
             "radius": atlas.radius,
@@ -119,31 +115,29 @@ class Result(GraspAtlas):
             "max_residual": float(atlas.residuals.max()),
             "quality": {
                 "name": quality_name(self.quality),
-                "best": best and best.quality,
-                "worst": worst and worst.quality,
+                "best": best.quality if best else None,
+                "worst": worst.quality if worst else None,
                 "at_x1": float(self.qualities[0]),
             },
-            "best": best
-            and {
-                "q": best.q.tolist(),
-                "object_xyz": best.object_xyz.tolist(),
-                "object_quat_xyzw": best.object_quat_xyzw.tolist(),
-                "chart": best.chart,
-            },
-            **({"others": self._summary_of_others(best)} if self.others else {}),
-            **({"refined": self._summary_of_refinement()} if self.refinement else {}),
+            "best": _summary_of_grasp(best) if best else None,
         }
+        if self.others:
+            summary["others"] = self._summary_of_others(best)
+        if self.refinement:
+            summary["refined"] = self._summary_of_refinement()
+        return summary
 
-    def _summary_of_others(self, best: Grasp | None) -> dict[str, Any]:
+    def _summary_of_others(self, best: Grasp | None) -> dict[str, OtherSummary]:
         """The other indices: at the best grasp, and over all grasps that meet the requirements."""
-        out = {}
+        out: dict[str, OtherSummary] = {}
         for name, values in self.others.items():
             left = values[self.accepted]
-            at_best = float(values[best.chart]) if best else None
-            out[name] = {"at_best": at_best, **({"largest": float(left.max())} if len(left) else {})}
+            out[name] = {"at_best": float(values[best.chart]) if best else None}
+            if len(left):
+                out[name]["largest"] = float(left.max())
         return out
 
-    def _summary_of_refinement(self) -> dict[str, Any]:
+    def _summary_of_refinement(self) -> RefinementSummary:
         best, refinement = self.refined_best, self.refinement
         assert refinement is not None
         return {
@@ -172,6 +166,15 @@ class Result(GraspAtlas):
             GraspAtlasError: If the file cannot be written.
         """
         save_result(self, path)
+
+
+def _summary_of_grasp(grasp: Grasp) -> GraspSummary:
+    return {
+        "q": grasp.q.tolist(),
+        "object_xyz": grasp.object_xyz.tolist(),
+        "object_quat_xyzw": grasp.object_quat_xyzw.tolist(),
+        "chart": grasp.chart,
+    }
 
 
 def load_result(path: str | os.PathLike[str]) -> Result:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.atlas.coverage import measure_coverage
 from graspatlas.atlas.verification import RESIDUAL_TOLERANCE, Check, CheckReport, atlas_checks
@@ -17,10 +16,10 @@ from graspatlas.requirements.lost import kept
 from graspatlas.requirements.screening import screen
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.result.refinement import Refinement
+from graspatlas.support.arrays import Array
 
 __all__ = ["check_result"]
 
-Array = NDArray[np.float64]
 
 #: How far a point of the manifold may lie from the nearest polytope, as a share of the chart radius.
 COVERAGE_TOLERANCE = 0.5

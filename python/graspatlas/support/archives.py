@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import os
 import zipfile
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 
+from graspatlas.support.arrays import AnyArray
 from graspatlas.support.machine import available_bytes
 
 __all__ = ["DamagedArchive", "read_arrays"]
@@ -27,7 +28,7 @@ class DamagedArchive(Exception):
     """What is wrong with an archive, in words."""
 
 
-def read_arrays(stream: BinaryIO) -> dict[str, Any]:
+def read_arrays(stream: BinaryIO) -> dict[str, AnyArray]:
     """All arrays of an NPZ archive, by name.
 
     Args:
@@ -69,7 +70,7 @@ def _name(member: zipfile.ZipInfo) -> str:
     return member.filename[: -len(".npy")]
 
 
-def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Any:
+def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> AnyArray:
     """One array, once its header fits its size."""
     with archive.open(member) as stream:
         version = np.lib.format.read_magic(stream)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.support.arrays import AnyArray, Array
@@ -63,13 +63,13 @@ def save_frame(frame: DataFrame, path: Path) -> None:
         pq.write_table(pa.table(columns), stream)
 
 
-def joined(*tables: Mapping[str, Any]) -> dict[str, Any]:
+def joined(*tables: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
     """Columns of several tables side by side.
 
     Raises:
         GraspAtlasError: If two have one name, as a joint called ``quality`` would.
     """
-    columns: dict[str, Any] = {}
+    columns: dict[str, AnyArray] = {}
     for table in tables:
         for name in table:
             if name in columns:

@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 
@@ -191,7 +191,7 @@ def writable_folder(path: str | os.PathLike[str]) -> Path:
     return folder
 
 
-def write_csv(path: str | os.PathLike[str], columns: Mapping[str, Iterable[Any]]) -> None:
+def write_csv(path: str | os.PathLike[str], columns: Mapping[str, Iterable[object]]) -> None:
     """Write a table as CSV: a row of names, then one row an entry; UTF-8, commas, a dot in numbers.
 
     Numbers have as many digits as it takes to read the same ones back; flags are ``true`` and ``false``, and a NaN
@@ -213,7 +213,7 @@ def write_csv(path: str | os.PathLike[str], columns: Mapping[str, Iterable[Any]]
         stream.write(text.getvalue().encode("utf-8"))
 
 
-def _cell(value: Any) -> Any:
+def _cell(value: object) -> object:
     if isinstance(value, bool):
         return "true" if value else "false"
     return "" if value != value else value

@@ -17,9 +17,12 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import Any
+from typing import TypeAlias
 
 __all__ = ["SAME_PRESS", "hear", "held", "keeping", "stoppable", "stopped_by", "stopping"]
+
+#: What Python calls on a signal: a function, or a word for doing nothing, or the usual thing.
+Handler: TypeAlias = "Callable[[int, FrameType | None], object] | int | signal.Handlers | None"
 
 #: Signals that come so soon after one that was heard are the same press of a key [s].
 SAME_PRESS = 0.4
@@ -54,7 +57,7 @@ class _Watch:
     def interruption(self) -> KeyboardInterrupt:
         """What is raised; its attribute ``signal`` is the number of the first signal."""
         error = KeyboardInterrupt()
-        error.signal = self.number  # type: ignore[attr-defined]
+        setattr(error, "signal", self.number)  # noqa: B010  (its type has no such attribute)
         return error
 
     def settle(self) -> None:
@@ -89,9 +92,9 @@ def stoppable(also: Sequence[signal.Signals] = ()) -> Iterator[None]:
         yield
         return
     watch = _Watch()
-    theirs: dict[int, Any] = {}
+    theirs: dict[int, Handler] = {}
     try:
-        usual: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, **dict.fromkeys(also, signal.SIG_DFL)}
+        usual: dict[int, Handler] = {signal.SIGINT: signal.default_int_handler, **dict.fromkeys(also, signal.SIG_DFL)}
         for number, own in usual.items():
             if signal.getsignal(number) == own:
                 theirs[number] = signal.signal(number, watch.hear)
@@ -129,7 +132,7 @@ def hear() -> None:
 
 
 @contextmanager
-def keeping(**kept: Any) -> Iterator[None]:
+def keeping(**kept: object) -> Iterator[None]:
     """Let an error that leaves the block carry what took long to make, as attributes of these names.
 
     Args:

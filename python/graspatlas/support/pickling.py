@@ -10,7 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 __all__ = ["Light", "rebuild", "reduced"]
 
@@ -20,14 +22,16 @@ class Light:
 
     __slots__ = ()
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         """The attributes without the cached properties."""
         owner = type(self)
         kept = vars(self).items()
         return {name: value for name, value in kept if not isinstance(getattr(owner, name, None), cached_property)}
 
 
-def reduced(thing: Any, base: type, arguments: tuple[Any, ...]) -> tuple[Callable[..., Any], tuple[Any, ...], Any]:
+def reduced(
+    thing: object, base: type, arguments: tuple[object, ...]
+) -> tuple[Callable[..., object], tuple[object, ...], object]:
     """What ``__reduce__`` of a compiled object returns.
 
     Args:
@@ -40,7 +44,7 @@ def reduced(thing: Any, base: type, arguments: tuple[Any, ...]) -> tuple[Callabl
     return rebuild, (type(thing), base, arguments), state or None
 
 
-def rebuild(cls: Any, base: Any, arguments: tuple[Any, ...]) -> Any:
+def rebuild(cls: type[T], base: Any, arguments: tuple[object, ...]) -> T:
     """An object of a class, the compiled part of which is made from these arguments; see :func:`reduced`."""
     thing = cls.__new__(cls)
     base.__init__(thing, *arguments)

@@ -6,9 +6,12 @@ import os
 import re
 import sys
 import unicodedata
-from typing import TextIO
+from typing import TYPE_CHECKING
 
 from graspatlas.errors import GraspAtlasError
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 __all__ = ["finish_output", "printable", "say", "shortened", "silence_output"]
 
@@ -38,7 +41,7 @@ def shortened(text: str) -> str:
     return re.sub(rf"\S{{{LONGEST_WORD},}}", lambda word: f"{word[0][:80]}...{word[0][-20:]}", text)
 
 
-def say(*lines: object, file: TextIO | None = None, end: str = "\n") -> None:
+def say(*lines: object, file: SupportsWrite[str] | None = None, end: str = "\n") -> None:
     """Print lines, each made printable; on standard output by default.
 
     Letters that the terminal's encoding lacks are written as escapes.

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from graspatlas.errors import GraspAtlasError, unknown_name
+from graspatlas.support.arrays import Array
 
 __all__ = [
+    "Plain",
+    "PlainTable",
+    "StatedTable",
     "checked_instance",
     "checked_table",
     "number",
@@ -24,9 +28,15 @@ __all__ = [
 ]
 
 T = TypeVar("T", bound=np.generic)
+#: Plain data, as JSON and YAML have it: texts, numbers and booleans, lists and tables of such, and None.
+Plain: TypeAlias = "bool | int | float | str | Sequence[Plain] | Mapping[str, Plain] | None"
+#: A table of plain data that is made here.
+PlainTable: TypeAlias = "dict[str, Plain]"
+#: A table that the user or a file states: its values are anything until they are checked.
+StatedTable: TypeAlias = Mapping[str, Any]
 
 
-def checked_instance(value: Any, kind: type | tuple[type, ...], what: str, hint: str = "") -> None:
+def checked_instance(value: object, kind: type | tuple[type, ...], what: str, hint: str = "") -> None:
     """Make sure that a value is of a type.
 
     Args:
@@ -44,15 +54,13 @@ def checked_instance(value: Any, kind: type | tuple[type, ...], what: str, hint:
         raise GraspAtlasError(f"{what} must be a {expected}, got {shown(value)}{hint and f'; see {hint}'}")
 
 
-def shown(value: Any) -> str:
+def shown(value: object) -> str:
     """A value for a message: text and numbers as they are, of large things the type."""
     text = repr(value)
     return text if len(text) <= 60 and "\n" not in text else f"a {type(value).__name__}"
 
 
-def checked_table(
-    data: Any, what: str, required: Sequence[str], optional: Sequence[str] | None = ()
-) -> Mapping[str, Any]:
+def checked_table(data: object, what: str, required: Sequence[str], optional: Sequence[str] | None = ()) -> StatedTable:
     """A table, with all the keys that it needs and none that is not known.
 
     Args:
@@ -60,6 +68,9 @@ def checked_table(
         what: Its name for the message.
         required: Keys that it must have.
         optional: Keys that it may have; None allows any.
+
+    Returns:
+        The table, whose values may be anything yet.
 
     Raises:
         GraspAtlasError: If it is not a table, lacks a key, or has an unknown one.
@@ -76,7 +87,7 @@ def checked_table(
     return data
 
 
-def number(value: Any, what: str) -> float:
+def number(value: object, what: str) -> float:
     """A number.
 
     Raises:
@@ -90,7 +101,7 @@ def number(value: Any, what: str) -> float:
         raise GraspAtlasError(f"{what} is too large a whole number") from None
 
 
-def positive(value: Any, what: str, most: float = float("inf")) -> float:
+def positive(value: object, what: str, most: float = float("inf")) -> float:
     """A number above 0, and finite.
 
     Args:
@@ -110,7 +121,7 @@ def positive(value: Any, what: str, most: float = float("inf")) -> float:
     return given
 
 
-def whole(value: Any, what: str, least: int = 1, most: int | None = None) -> int:
+def whole(value: object, what: str, least: int = 1, most: int | None = None) -> int:
     """A whole number.
 
     Args:
@@ -131,7 +142,7 @@ def whole(value: Any, what: str, least: int = 1, most: int | None = None) -> int
     return given
 
 
-def numbers(value: Any, what: str) -> tuple[float, ...]:
+def numbers(value: object, what: str) -> tuple[float, ...]:
     """A row of numbers.
 
     Raises:
@@ -142,7 +153,7 @@ def numbers(value: Any, what: str) -> tuple[float, ...]:
     return tuple(number(item, what) for item in value)
 
 
-def number_array(value: ArrayLike, what: str) -> NDArray[np.float64]:
+def number_array(value: object, what: str) -> Array:
     """An array of numbers.
 
     Raises:

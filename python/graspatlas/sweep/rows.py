@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.support.files import opened, replaced
 
-__all__ = ["COLUMNS", "ROWS", "read_rows", "write_rows"]
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+__all__ = ["COLUMNS", "ROWS", "Row", "read_rows", "write_rows"]
 
 #: Name of the file of rows in the folder of a sweep.
 ROWS = "runs.parquet"
@@ -48,15 +51,18 @@ COLUMNS = {
     "version": _TEXT,
 }
 
+#: A row: its values by column, of the types above or None.
+Row: TypeAlias = dict[str, Any]
 
-def _schema() -> Any:
+
+def _schema() -> pa.Schema:
     import pyarrow as pa
 
     types = {_NUMBERS: pa.list_(pa.float64()), _TEXTS: pa.list_(pa.string())}
     return pa.schema([(name, types.get(kind) or getattr(pa, kind)()) for name, kind in COLUMNS.items()])
 
 
-def read_rows(path: Path) -> dict[str, dict[str, Any]]:
+def read_rows(path: Path) -> dict[str, Row]:
     """Rows that earlier starts have written, by run."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -73,7 +79,7 @@ def read_rows(path: Path) -> dict[str, dict[str, Any]]:
     return {row["run"]: row for row in table.to_pylist()}
 
 
-def write_rows(path: Path, rows: dict[str, dict[str, Any]]) -> None:
+def write_rows(path: Path, rows: dict[str, Row]) -> None:
     """Replace the file of rows, at once or not at all."""
     import pyarrow as pa
     import pyarrow.parquet as pq

@@ -10,7 +10,8 @@ from typing import Any
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.problems import load_problem
-from graspatlas.sweep.rows import COLUMNS
+from graspatlas.support.validation import PlainTable
+from graspatlas.sweep.rows import COLUMNS, Row
 from graspatlas.version import __version__
 
 __all__ = ["Run", "runs_of"]
@@ -28,7 +29,7 @@ class Run:
     """
 
     file: str
-    problem: dict[str, Any] | None
+    problem: PlainTable | None
     error: str = ""
     dimension: int | None = None
     radius: float | None = None
@@ -45,7 +46,7 @@ class Run:
         content = {**asdict(self), "file": self.file if self.problem is None else ""}
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
-    def row(self, **values: Any) -> dict[str, Any]:
+    def row(self, **values: object) -> Row:
         """A row of the table: what was asked for, and what is known."""
         asked = {name: getattr(self, name) for name in COLUMNS if name in self.__dataclass_fields__}
         name = self.problem["name"] if self.problem else ""
@@ -53,7 +54,7 @@ class Run:
         return {**dict.fromkeys(COLUMNS), **asked, **known, **values}
 
 
-def runs_of(file: str, fixed: Run, choices: Sequence[Sequence[Any]]) -> Iterator[Run]:
+def runs_of(file: str, fixed: Run, choices: Sequence[Sequence[int | float | str | None]]) -> Iterator[Run]:
     """The runs of one problem; a problem that cannot be loaded has one, which says so."""
     try:
         problem = load_problem(file)

@@ -14,7 +14,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.requirement import parse_requirement
@@ -23,7 +22,7 @@ from graspatlas.result.refinement import PeakStatus
 from graspatlas.support.files import writable_folder
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.progress import progress_bar
-from graspatlas.sweep.rows import ROWS, read_rows, write_rows
+from graspatlas.sweep.rows import ROWS, Row, read_rows, write_rows
 from graspatlas.sweep.runs import Run, runs_of
 from graspatlas.sweep.workers import rows_as_they_come
 
@@ -45,21 +44,21 @@ class Sweep:
     """
 
     path: Path
-    rows: list[dict[str, Any]] = field(repr=False)
+    rows: list[Row] = field(repr=False)
     skipped: int
     missing: int
 
     @property
-    def failed(self) -> list[dict[str, Any]]:
+    def failed(self) -> list[Row]:
         """Rows of the runs that failed."""
         return [row for row in self.rows if row["error"]]
 
-    def best(self) -> dict[str, dict[str, Any]]:
+    def best(self) -> dict[str, Row]:
         """For each quality index, the row with the best grasp over all problems and options.
 
         Rows whose refined best is none, since the index grows without bound there, do not count.
         """
-        out: dict[str, dict[str, Any]] = {}
+        out: dict[str, Row] = {}
         for row in self.rows:
             if row["refined_status"] == str(PeakStatus.UNBOUNDED):
                 continue
@@ -120,7 +119,7 @@ def run_sweep(
     for text in require:
         parse_requirement(text)
     fixed = Run("", None, require=tuple(require), refine=refine, max_charts=max_charts, max_seconds=max_seconds)
-    values: list[Sequence[Any]] = [dimensions, radii, epsilons, qualities]
+    values: list[Sequence[int | float | str | None]] = [dimensions, radii, epsilons, qualities]
     choices = list(itertools.product(*(value or [None] for value in values)))
     runs = {run.key: run for file in problems for run in runs_of(str(file), fixed, choices)}
     if not runs:

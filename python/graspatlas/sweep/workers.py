@@ -8,7 +8,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from typing import Any
+from typing import TYPE_CHECKING
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.optimizer.optimize import optimize
@@ -16,7 +16,11 @@ from graspatlas.problem.problem import Problem
 from graspatlas.problem.requirement import parse_requirement
 from graspatlas.result.result import Result
 from graspatlas.support.machine import available_threads
+from graspatlas.sweep.rows import Row
 from graspatlas.sweep.runs import Run
+
+if TYPE_CHECKING:
+    import dask.distributed as dask
 
 __all__ = ["rows_as_they_come"]
 
@@ -24,7 +28,7 @@ __all__ = ["rows_as_they_come"]
 KNOWS_SAFE_PATH = sys.version_info >= (3, 11)
 
 
-def rows_as_they_come(runs: Sequence[Run], scheduler: str | None, workers: int | None) -> Iterator[dict[str, Any]]:
+def rows_as_they_come(runs: Sequence[Run], scheduler: str | None, workers: int | None) -> Iterator[Row]:
     """Rows of the runs in the order in which they end; a worker that dies fails its run only."""
     broken = [run for run in runs if run.problem is None]
     yield from (run.row(error=run.error) for run in broken)
@@ -64,7 +68,7 @@ def _empty_folder() -> Iterator[None]:
             os.chdir(here)
 
 
-def _local_cluster(workers: int) -> Any:
+def _local_cluster(workers: int) -> dask.LocalCluster:
     """Workers on this machine, in the current folder."""
     import dask.distributed as dask
 
@@ -78,14 +82,14 @@ def _local_cluster(workers: int) -> Any:
     return cluster
 
 
-def _solved(sound: Sequence[Run], scheduler: str | None, workers: int | None) -> Iterator[dict[str, Any]]:
+def _solved(sound: Sequence[Run], scheduler: str | None, workers: int | None) -> Iterator[Row]:
     """Rows of runs whose problem could be loaded."""
     import dask.distributed as dask
 
     count = min(workers or available_threads(), len(sound))
-    place: Any = _local_cluster(count) if scheduler is None else scheduler
+    cluster = _local_cluster(count) if scheduler is None else None
     try:
-        client = dask.Client(place, timeout="20s")
+        client = dask.Client(scheduler if cluster is None else cluster, timeout="20s")
     except (OSError, ValueError) as error:
         raise GraspAtlasError(
             f"no Dask scheduler answers at '{scheduler}' ({error}); start one with: dask scheduler"
@@ -98,11 +102,11 @@ def _solved(sound: Sequence[Run], scheduler: str | None, workers: int | None) ->
             yield run.row(error=f"{type(failure).__name__}: {failure}") if failure is not None else future.result()
     finally:
         client.close()
-        if scheduler is None:
-            place.close()
+        if cluster is not None:
+            cluster.close()
 
 
-def _solve(run: Run) -> dict[str, Any]:
+def _solve(run: Run) -> Row:
     """The row of a run; on a worker."""
     start = time.perf_counter()
     try:
@@ -124,7 +128,7 @@ def _solve(run: Run) -> dict[str, Any]:
     return run.row(**_values(result), seconds=time.perf_counter() - start)
 
 
-def _values(result: Result) -> dict[str, Any]:
+def _values(result: Result) -> Row:
     """What a row says about a result."""
     values = {
         "status": str(result.status),

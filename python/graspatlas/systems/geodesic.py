@@ -18,19 +18,17 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 from graspatlas import _core
+from graspatlas.support.arrays import Array, BoolArray, IndexArray
 from graspatlas.support.progress import progress_bar
 from graspatlas.systems.system import AnySystem
 
 __all__ = ["BOUND_TOLERANCE", "Allowed", "arc_lengths", "bridge", "evenly", "nearest_point", "shorten"]
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 #: Tells which points [n, configuration_size] may be part of the chain [n].
-Allowed = Callable[[Array], Flags]
+Allowed = Callable[[Array], BoolArray]
 
 #: Largest entry of |R(x)| that counts as zero, as in the projection of the compiled core.
 ZERO = 1e-11
@@ -384,7 +382,7 @@ class _HalfSpaces:
         n, k = len(chain.X), chain.system.dimension
         return cls(np.zeros((n, k)), np.full(n, np.inf))
 
-    def add(self, chain: _Chain, points: NDArray[np.intp], u: Array, allowed: Allowed) -> None:
+    def add(self, chain: _Chain, points: IndexArray, u: Array, allowed: Allowed) -> None:
         """Add those between points and the places to which they would move, u (n, k)."""
         share, width = np.zeros(len(points)), 1.0
         for _ in range(BORDER_HALVINGS):

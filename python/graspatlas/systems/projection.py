@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from graspatlas.errors import GraspAtlasError
+from graspatlas.support.arrays import Array
 from graspatlas.support.validation import number_array
 from graspatlas.systems.system import AnySystem
 
 __all__ = ["checked_point", "project"]
 
-Array = NDArray[np.float64]
 
 #: Steps after which a projection is given up; those that converge need a dozen.
 MAX_STEPS = 60

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import ArrayLike, NDArray
+from mpl_toolkits.mplot3d import Axes3D
+from numpy.typing import ArrayLike
 
 from graspatlas.atlas.atlas import Atlas
 from graspatlas.errors import GraspAtlasError
 from graspatlas.quality.batched import quality_name
 from graspatlas.result.result import Result
+from graspatlas.support.arrays import Array
 from graspatlas.viewer.figures.polygons import Coordinates, chart_polygons, default_coordinates, open_charts
 from graspatlas.viewer.figures.style import BLUE, INK, PAGE, RED, REJECTED, SINGULAR, Picture, styled
-from graspatlas.viewer.figures.surface import View, add_axes, add_polygons, quality_colours, scale_of
+from graspatlas.viewer.figures.surface import Place, View, add_axes, add_polygons, quality_colours, scale_of
 
 __all__ = ["VIEWS", "AtlasDrawing", "plot_atlas", "plot_growth"]
 
-Array = NDArray[np.float64]
 
 #: Elevation and azimuth of the views from above and from below [degrees].
 VIEWS = ((28.0, -58.0), (-28.0, -58.0))
@@ -54,8 +56,9 @@ class AtlasDrawing:
         self.singular = singular
         self.values = self._checked(values if values is not None or isinstance(source, Atlas) else source.qualities)
         self.centers = self.coordinates.of(self.atlas.centers)
-        kept = isinstance(source, Result) and values is None
-        self.rejected = ~source.accepted if kept else np.zeros(self.atlas.n_charts, bool)  # type: ignore[union-attr]
+        self.rejected = np.zeros(self.atlas.n_charts, bool)
+        if isinstance(source, Result) and values is None:
+            self.rejected = ~source.accepted
         self.polygons = chart_polygons(self.atlas, self.coordinates) if self.atlas.dimension == 2 else None
         self.scale = None
         if self.values is not None:
@@ -72,11 +75,11 @@ class AtlasDrawing:
             )
         return array
 
-    def draw(self, figure: Any, place: Any, view: View) -> Any:
+    def draw(self, figure: Figure, place: Place, view: View) -> Axes3D:
         """Draw the atlas into new axes of a figure; see :func:`graspatlas.viewer.figures.surface.add_axes`."""
         points = np.concatenate(self.polygons) if self.polygons else self.centers
         axes = add_axes(figure, place, self.coordinates, points, view)
-        colours: Any = BLUE
+        colours: Array | str = BLUE
         if self.values is not None and self.scale is not None:
             colours = quality_colours(self.values, self.scale, self.singular, self.rejected)
         if self.polygons:
@@ -85,15 +88,15 @@ class AtlasDrawing:
             axes.scatter(*self.centers.T, c=colours, s=1.2, linewidths=0.0, zorder=2, depthshade=False)
         return axes
 
-    def mark(self, axes: Any, charts: Sequence[int], **style: Any) -> None:
+    def mark(self, axes: Axes3D, charts: Sequence[int], **style: str | float) -> None:
         """Mark charts by symbols that nothing hides."""
         options = {"marker": "o", "s": 22.0, "facecolors": "white", "edgecolors": INK, "linewidths": 0.8}
         axes.scatter(*self.centers[list(charts)].T, zorder=5, depthshade=False, **(options | style))
 
     def add_colour_bar(
         self,
-        figure: Any,
-        place: tuple[float, float, float, float],
+        figure: Figure,
+        place: Place,
         label: str | None = None,
         orientation: str = "vertical",
     ) -> None:
@@ -191,12 +194,11 @@ def plot_growth(stages: Sequence[Atlas], *, coordinates: Coordinates | None = No
     return figure
 
 
-def _add_legend(figure: Any, drawing: AtlasDrawing, *, with_best: bool) -> None:
+def _add_legend(figure: Figure, drawing: AtlasDrawing, *, with_best: bool) -> None:
     """Say what star, black and grey stand for, where they occur."""
-    marks: list[Any] = []
+    marks: list[Artist] = []
     if with_best:
-        star: dict[str, Any] = {"marker": "*", "markersize": 8.0, "mfc": "white", "mec": INK, "mew": 0.8}
-        marks.append(Line2D([], [], linestyle="none", label="best", **star))
+        marks.append(Line2D([], [], ls="none", marker="*", ms=8.0, mfc="white", mec=INK, mew=0.8, label="best"))
     if drawing.values is not None and (drawing.values < drawing.singular).any():
         marks.append(Patch(facecolor=SINGULAR, label="singular"))
     if drawing.rejected.any():

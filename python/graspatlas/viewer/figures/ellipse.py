@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
-from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
@@ -18,7 +17,6 @@ from graspatlas.viewer.figures.style import COLUMN, Picture, readable, styled
 
 __all__ = ["BEST", "WORST", "draw_ellipses", "extreme_semi_axes", "plot_ellipsoid", "unit_of"]
 
-Array = NDArray[np.float64]
 
 #: Colours of the ellipses: the first grasp's is that of a high quality, the second's that of a low one.
 BEST, WORST = "#2f9e44", "#a01220"
@@ -89,13 +87,13 @@ def plot_ellipsoid(
 
 
 def draw_ellipses(
-    axes: Any,
+    axes: Axes,
     problem: Problem,
     grasps: Mapping[str, Grasp],
     *,
     length_unit: float | None = None,
     equal: bool = False,
-    colours: Sequence[Any] | None = None,
+    colours: Sequence[str] | None = None,
 ) -> None:
     """Draw the ellipses of grasps by name into axes; `equal` draws both directions to one scale."""
     turn = np.linspace(0.0, 2.0 * np.pi, 181)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from matplotlib.figure import Figure
 
 from graspatlas.result.result import Result
 from graspatlas.viewer.figures.atlas import VIEWS, AtlasDrawing
@@ -59,7 +59,7 @@ def plot_best_and_worst(
     return figure
 
 
-def _draw_grasps(figure: Any, result: Result) -> None:
+def _draw_grasps(figure: Figure, result: Result) -> None:
     problem = result.problem
     grasps = {"worst": result.worst, "best": result.best}
     planar = problem.object_joint_model.planar

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+from matplotlib.figure import Figure
 
 from graspatlas.analysis.peaks import local_maxima
 from graspatlas.grasps.grasps import Grasp, Grasps
-from graspatlas.quality.batched import batched
+from graspatlas.quality.batched import batched, quality_name
 from graspatlas.quality.evaluation import INDICES, evaluate
 from graspatlas.result.result import Result
+from graspatlas.support.arrays import Array
 from graspatlas.viewer.figures.atlas import VIEWS, AtlasDrawing
 from graspatlas.viewer.figures.ellipse import draw_ellipses, extreme_semi_axes, unit_of
 from graspatlas.viewer.figures.planar import draw_planar_grasp, require_planar
@@ -22,7 +21,6 @@ from graspatlas.viewer.figures.style import PAGE, Picture, readable, styled
 
 __all__ = ["SINGULAR_BELOW", "in_units", "plot_planar_indices", "with_index"]
 
-Array = NDArray[np.float64]
 
 #: A grasp is singular when its index is smaller; lengths in the problem's length scale (the paper, Section V).
 SINGULAR_BELOW = {"inverse_condition_number": 1e-3, "manipulability_volume": 1e-4, "smallest_semi_axis": 1e-3}
@@ -35,10 +33,11 @@ def in_units(name: str, length_unit: float) -> Callable[[Grasps], Array]:
         name: Such as ``"manipulability_volume"``.
         length_unit: The unit [m].
     """
+    bundled: Callable[..., Array] = INDICES[name]
 
     @batched
     def index(grasps: Grasps) -> Array:
-        return INDICES[name](grasps, length_unit=length_unit)  # type: ignore[call-arg]
+        return bundled(grasps, length_unit=length_unit)
 
     index.__name__ = name
     return index
@@ -47,7 +46,7 @@ def in_units(name: str, length_unit: float) -> Callable[[Grasps], Array]:
 def with_index(result: Result, name: str, length_unit: float | None = None) -> Result:
     """The same atlas with another bundled index, lengths in the problem's length scale unless told otherwise."""
     index = in_units(name, result.problem.length_scale if length_unit is None else length_unit)
-    grasps = Grasps(result.problem, result.atlas.centers, result.atlas.system)  # type: ignore[arg-type]
+    grasps = Grasps(result.problem, result.atlas.centers, result.system)
     return replace(result, quality=index, qualities=evaluate(index, grasps))
 
 
@@ -83,8 +82,8 @@ def plot_planar_indices(result: Result, *, coordinates: Coordinates | None = Non
     return figure
 
 
-def _draw_index(figure: Any, result: Result, coordinates: Coordinates, bottom: float, letter: str) -> None:
-    name = result.quality.__name__  # type: ignore[union-attr]
+def _draw_index(figure: Figure, result: Result, coordinates: Coordinates, bottom: float, letter: str) -> None:
+    name = quality_name(result.quality)
     drawing = AtlasDrawing(result, coordinates, singular=SINGULAR_BELOW[name])
     n_singular = int((result.qualities < SINGULAR_BELOW[name]).sum())
     for number, view in enumerate(VIEWS):
@@ -96,7 +95,7 @@ def _draw_index(figure: Any, result: Result, coordinates: Coordinates, bottom: f
     figure.text(0.575, bottom - 0.008, words, ha="center", fontsize=8.0)
 
 
-def _draw_insets(figure: Any, result: Result) -> None:
+def _draw_insets(figure: Figure, result: Result) -> None:
     """Best, worst and a local maximum, one below the other."""
     maxima = local_maxima(result)
     charts = [int(maxima[0]), result.worst.chart, int(maxima[min(1, len(maxima) - 1)])]
@@ -113,7 +112,7 @@ def _draw_insets(figure: Any, result: Result) -> None:
 
 
 def _draw_inset_ellipse(
-    figure: Any, result: Result, grasp: Grasp, bottom: float, longest: float, *, last: bool
+    figure: Figure, result: Result, grasp: Grasp, bottom: float, longest: float, *, last: bool
 ) -> None:
     axes = figure.add_axes((0.055, bottom + 0.03, 0.16, 0.06))
     draw_ellipses(axes, result.problem, {"": grasp}, equal=True)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from graspatlas.analysis.climb import Climb, climb
@@ -107,7 +108,7 @@ def plot_climbs(
     return figure
 
 
-def _draw_starts(figure: Any, result: Result, climbs: Sequence[Climb], name: str) -> None:
+def _draw_starts(figure: Figure, result: Result, climbs: Sequence[Climb], name: str) -> None:
     """The index where the climbs started and where they ended."""
     axes = figure.add_axes((0.09, 0.15, 0.38, 0.75))
     starts, ends = (np.array([c.qualities[k] for c in climbs]) for k in (0, -1))
@@ -132,7 +133,7 @@ def _words(peak: Peak) -> str:
     return readable(peak.quality, 4) if peak.converged else f"> {readable(peak.quality, 2)}"
 
 
-def _finish_bars(axes: Any, rows: int, label: str, logarithmic: bool) -> None:
+def _finish_bars(axes: Axes, rows: int, label: str, logarithmic: bool) -> None:
     axes.set_ylim(rows + 0.6, 0.4)
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     if logarithmic:

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
 from graspatlas.analysis.pareto import knee, pareto_front, values_of
 from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.result.result import Result
+from graspatlas.support.arrays import Array, IntArray
 from graspatlas.viewer.figures.planar import draw_planar_grasp
 from graspatlas.viewer.figures.portrait import common_direction, portrait
 from graspatlas.viewer.figures.style import BLUE, INK, PAGE, RED, REJECTED, Picture, readable, styled
 
 __all__ = ["plot_pareto"]
 
-Array = NDArray[np.float64]
 
 #: Largest over median value from which an axis is logarithmic, when all values are positive.
 WIDE = 100.0
@@ -61,9 +62,9 @@ def plot_pareto(result: Result, first: Quality, second: Quality) -> Picture:
         axes.step(*stairs.T, where="pre", color=INK, lw=0.9, zorder=3, solid_joinstyle="miter")
         label = f"Pareto front, {len(front)} grasp{'s' if len(front) > 1 else ''}"
         axes.plot(*stairs.T, marker="o", ms=2.8, color=INK, lw=0.0, zorder=4, label=label)
-        _mark(axes, values[0], marker="s", ms=4.6, mfc="white", label="first grasp")
+        _mark(axes, values[0], "s", 4.6, "white", label="first grasp")
         for portrayed in shown:
-            _mark(axes, values[portrayed.chart], **portrayed.symbol)
+            _mark(axes, values[portrayed.chart], portrayed.marker, portrayed.size, portrayed.colour)
         within = np.vstack([values[result.accepted], values[:1]])
         for axis, name, column in zip("xy", names, within.T, strict=True):
             _scale(axes, axis, column)
@@ -80,34 +81,38 @@ class _Portrayed:
 
     name: str
     chart: int
-    symbol: dict[str, Any]
+    marker: str
+    size: float
+    colour: str
 
 
-def _chosen(values: Array, front: NDArray[np.int64], names: list[str]) -> list[_Portrayed]:
+def _chosen(values: Array, front: IntArray, names: list[str]) -> list[_Portrayed]:
     """The front's ends, and its knee where it has one."""
     at = knee(values[front])
-    chosen = [_Portrayed(f"best {names[0]}", int(front[0]), {"marker": "*", "ms": 9.5, "mfc": GREEN})]
+    chosen = [_Portrayed(f"best {names[0]}", int(front[0]), "*", 9.5, GREEN)]
     if at is not None:
-        chosen.append(_Portrayed("knee", int(front[at]), {"marker": "D", "ms": 5.0, "mfc": RED}))
+        chosen.append(_Portrayed("knee", int(front[at]), "D", 5.0, RED))
     if len(front) > 1:
-        chosen.append(_Portrayed(f"best {names[1]}", int(front[-1]), {"marker": "^", "ms": 6.5, "mfc": YELLOW}))
+        chosen.append(_Portrayed(f"best {names[1]}", int(front[-1]), "^", 6.5, YELLOW))
     return chosen
 
 
-def _draw_dots(axes: Any, result: Result, values: Array) -> None:
+def _draw_dots(axes: Axes, result: Result, values: Array) -> None:
     """All charts: those that meet the requirements over the pale ones that do not."""
     kept = result.accepted
-    dots: dict[str, Any] = {"ls": "none", "marker": "o", "mew": 0.0, "rasterized": True}
-    axes.plot(*values[kept].T, color=BLUE, ms=2.2, alpha=0.75, zorder=2, label="grasps", **dots)
+    dots = partial(axes.plot, ls="none", marker="o", mew=0.0, rasterized=True)
+    dots(*values[kept].T, color=BLUE, ms=2.2, alpha=0.75, zorder=2, label="grasps")
     if not kept.all():
-        axes.plot(*values[~kept].T, color=REJECTED, ms=1.7, zorder=1, label="requirements not met", **dots)
+        dots(*values[~kept].T, color=REJECTED, ms=1.7, zorder=1, label="requirements not met")
 
 
-def _mark(axes: Any, point: Array, **symbol: Any) -> None:
-    axes.plot(*point, ls="none", mec=INK, mew=0.7, zorder=5, clip_on=False, **symbol)
+def _mark(axes: Axes, point: Array, marker: str, size: float, colour: str, label: str = "") -> None:
+    axes.plot(
+        *point, ls="none", mec=INK, mew=0.7, zorder=5, clip_on=False, marker=marker, ms=size, mfc=colour, label=label
+    )
 
 
-def _scale(axes: Any, axis: str, values: Array) -> None:
+def _scale(axes: Axes, axis: str, values: Array) -> None:
     """Fit an axis to values; logarithmic where they span many powers of ten."""
     low, high = float(values.min()), float(values.max())
     if low > 0.0 and high > WIDE * np.median(values):
@@ -119,7 +124,7 @@ def _scale(axes: Any, axis: str, values: Array) -> None:
     getattr(axes, f"set_{axis}lim")(low - room, high + room)
 
 
-def _draw_portraits(figure: Any, result: Result, shown: list[_Portrayed], values: Array) -> None:
+def _draw_portraits(figure: Figure, result: Result, shown: list[_Portrayed], values: Array) -> None:
     """The marked grasps, one above the other, seen from one side, with their symbols and values."""
     problem = result.problem
     grasps = [result.grasp(portrayed.chart) for portrayed in shown]
@@ -134,7 +139,8 @@ def _draw_portraits(figure: Any, result: Result, shown: list[_Portrayed], values
             axes.imshow(portrait(problem, grasp, direction=direction, width=PORTRAIT[0], height=PORTRAIT[1]))
         axes.set_axis_off()
         pair = ", ".join(readable(float(value)) for value in values[portrayed.chart])
-        handle = Line2D([], [], ls="none", mec=INK, mew=0.7, **portrayed.symbol)
+        marker, size, colour = portrayed.marker, portrayed.size, portrayed.colour
+        handle = Line2D([], [], ls="none", mec=INK, mew=0.7, marker=marker, ms=size, mfc=colour)
         legend = figure.legend(
             [handle], [f"{portrayed.name}\n{pair}"], loc="center", bbox_to_anchor=(0.855, bottom + 0.285), borderpad=0.0
         )

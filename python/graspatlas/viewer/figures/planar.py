@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
-from numpy.typing import NDArray
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasp
 from graspatlas.problem.problem import Problem
+from graspatlas.support.arrays import Array
 from graspatlas.viewer.figures.style import COLUMN, INK, Picture, styled
 
 __all__ = ["draw_planar_grasp", "plot_planar_grasp", "require_planar"]
 
-Array = NDArray[np.float64]
 
 PALM, OBJECT, CONTACT, PHALANX = "#e4e4e4", "#3d6ea5", "#c2182b", "#4a4a4a"
 #: Points along an arc.
@@ -55,7 +53,7 @@ def require_planar(problem: Problem) -> None:
         )
 
 
-def draw_planar_grasp(axes: Any, problem: Problem, grasp: Grasp, *, thickness: float = 1.0) -> None:
+def draw_planar_grasp(axes: Axes, problem: Problem, grasp: Grasp, *, thickness: float = 1.0) -> None:
     """Draw one grasp into axes, in millimetres, to scale.
 
     Args:

@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspatlas.atlas.atlas import Atlas
 from graspatlas.atlas.status import Closed
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.problem.problem import Problem
+from graspatlas.support.arrays import Array, BoolArray
 
 __all__ = ["Coordinates", "chart_polygons", "default_coordinates", "object_pose", "open_charts", "principal"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -106,7 +104,7 @@ def chart_polygons(atlas: Atlas, coordinates: Coordinates) -> list[Array]:
     return [places[a:b] for a, b in pairwise(ends)]
 
 
-def open_charts(atlas: Atlas) -> NDArray[np.bool_]:
+def open_charts(atlas: Atlas) -> BoolArray:
     """Which charts are under expansion: a vertex lies outside the ball, and no step from there was refused [n]."""
     beyond = (np.linalg.norm(atlas.vertices, axis=1) > atlas.radius) & (atlas.vertex_closed == Closed.OPEN.value)
     owner = np.repeat(np.arange(atlas.n_charts), np.diff(atlas.vertex_start))

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from graspatlas.grasps.grasps import Grasp
 from graspatlas.problem.problem import Problem
+from graspatlas.support.arrays import Array, Float32Array
 from graspatlas.viewer.render.raster import nearest
 from graspatlas.viewer.render.shading import Shadow, dots, lamps, shade, to_linear, to_screen
 from graspatlas.viewer.scene.bodies import BodyShapes
@@ -17,8 +18,6 @@ from graspatlas.viewer.scene.viewpoint import Subject, best_direction
 
 __all__ = ["common_direction", "portrait"]
 
-Array = NDArray[np.float64]
-FloatArray = NDArray[np.float32]
 
 #: Each pixel is the mean of this many by this many.
 SAMPLES = 2
@@ -98,8 +97,8 @@ def _paint(
     parts: list[Part],
     camera: Camera,
     size: tuple[int, int],
-    light: FloatArray,
-    front: FloatArray,
+    light: Float32Array,
+    front: Float32Array,
     shadow: Shadow | None,
     see_through: bool,
 ) -> None:

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import io
+import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import IO, Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 __all__ = ["BLUE", "COLUMN", "INK", "PAGE", "QUALITY", "RED", "REJECTED", "SINGULAR", "Picture", "readable", "styled"]
 
-Array = NDArray[np.float64]
 
 #: Widths of a figure: one column of a journal's page, and the whole page [inches].
 COLUMN, PAGE = 3.5, 7.16
@@ -25,7 +24,7 @@ INK, SINGULAR, RED, BLUE = "#1c1c1c", "#000000", "#c8452f", "#4f7fb5"
 #: Colour of charts that do not meet the requirements.
 REJECTED = "#cfcfcf"
 
-STYLE: dict[str, Any] = {
+STYLE: dict[str, str | float | bool] = {
     "font.family": "STIXGeneral",
     "mathtext.fontset": "stix",
     "font.size": 8.5,
@@ -62,7 +61,7 @@ class Picture(Figure):
         self.savefig(stream, format="png")
         return stream.getvalue()
 
-    def savefig(self, fname: Any, **options: Any) -> None:
+    def savefig(self, fname: str | os.PathLike[str] | IO[bytes], **options: Any) -> None:
         """Write the figure as :meth:`matplotlib.figure.Figure.savefig` does, in the style it was drawn in."""
         with styled():
             super().savefig(fname, **options)
@@ -77,7 +76,7 @@ def styled() -> Iterator[None]:
     """Draw in this style, whatever the user has set."""
     with _DRAWING, mpl.rc_context():
         mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)  # type: ignore[arg-type, unused-ignore]
+        mpl.rcParams.update(STYLE)  # type: ignore[arg-type, unused-ignore]  # names of settings are a type since 3.11
         yield
 
 

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize, to_rgba
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
-from numpy.typing import NDArray
+from mpl_toolkits.mplot3d import Axes3D
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from mpl_toolkits.mplot3d.axis3d import Axis
 
+from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.viewer.figures.polygons import Coordinates
 from graspatlas.viewer.figures.style import INK, QUALITY, REJECTED, SINGULAR
 
-__all__ = ["View", "add_axes", "add_polygons", "quality_colours", "scale_of"]
+__all__ = ["Place", "View", "add_axes", "add_polygons", "quality_colours", "scale_of"]
 
-Array = NDArray[np.float64]
 
 #: Largest over median quality from which the colour scale is logarithmic.
 WIDE = 100.0
@@ -30,6 +30,8 @@ CORNER = 0.06
 FLATTEST = 0.35
 #: Elevation and azimuth of the eye [degrees].
 View = tuple[float, float]
+#: Left, bottom, width and height as shares of a figure.
+Place = tuple[float, float, float, float]
 
 
 def scale_of(values: Array, singular: float, logarithmic: bool | None) -> ScalarMappable:
@@ -48,11 +50,11 @@ def scale_of(values: Array, singular: float, logarithmic: bool | None) -> Scalar
     if logarithmic and low > 0.0:
         low, high = (float(value) for value in np.percentile(regular, CLIPPED))
     high = high if high > low else low + 1.0
-    norm: Any = LogNorm(low, high) if logarithmic and low > 0.0 else Normalize(min(low, 0.0), high)
+    norm = LogNorm(low, high) if logarithmic and low > 0.0 else Normalize(min(low, 0.0), high)
     return ScalarMappable(norm=norm, cmap=QUALITY)
 
 
-def quality_colours(values: Array, scale: ScalarMappable, singular: float, rejected: NDArray[np.bool_]) -> Array:
+def quality_colours(values: Array, scale: ScalarMappable, singular: float, rejected: BoolArray) -> Array:
     """Colours of qualities [n, 4]: red to green, black when singular, and grey when rejected."""
     colours = np.asarray(scale.to_rgba(values))
     colours[values < singular] = to_rgba(SINGULAR)
@@ -60,9 +62,7 @@ def quality_colours(values: Array, scale: ScalarMappable, singular: float, rejec
     return colours
 
 
-def add_axes(
-    figure: Any, place: tuple[float, float, float, float], coordinates: Coordinates, points: Array, view: View
-) -> Any:
+def add_axes(figure: Figure, place: Place, coordinates: Coordinates, points: Array, view: View) -> Axes3D:
     """Axes for an atlas: upright, without perspective, to scale when the coordinates have one unit.
 
     Args:
@@ -78,7 +78,7 @@ def add_axes(
     side = max(width, height)
     middle = np.array([place[0] + place[2] / 2.0, place[1] + place[3] / 2.0])
     corner = middle - side / inches / 2.0
-    axes = figure.add_axes((*corner, *(side / inches)), projection="3d", computed_zorder=False)
+    axes: Axes3D = figure.add_axes((*corner, *(side / inches)), projection="3d", computed_zorder=False)
     axes.set_proj_type("ortho")
     axes.view_init(elev=view[0], azim=view[1])
     reach = _reach(box, view)
@@ -113,7 +113,7 @@ def _reach(box: Array, view: View) -> Array:
     return np.array([np.abs(right) @ size, np.abs(up) @ size])
 
 
-def _style(axis: Any, label: str) -> None:
+def _style(axis: Axis, label: str) -> None:
     axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
     axis.line.set_color(INK)
     axis.line.set_linewidth(0.6)
@@ -124,7 +124,7 @@ def _style(axis: Any, label: str) -> None:
     axis.set_tick_params(pad=-1.8, labelsize=6.5)
 
 
-def add_polygons(axes: Any, polygons: list[Array], colours: Any, edge: float = 0.25) -> None:
+def add_polygons(axes: Axes3D, polygons: list[Array], colours: Array | str, edge: float = 0.25) -> None:
     """Lay polygons into axes, nearer ones over farther ones.
 
     Args:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from graspatlas.errors import GraspAtlasError
+from graspatlas.support.arrays import Float32Array
 from graspatlas.viewer.render.raster import Fragments, fragments, nearest
 from graspatlas.viewer.render.shading import FloorShadow, Shadow, crevices, dots, lamps, shade, to_linear, to_screen
 from graspatlas.viewer.render.text_images import GREY, caption_image, legend_image, text_image
@@ -18,8 +18,6 @@ from graspatlas.viewer.scene.scene import SHOW_THROUGH, Part, Scene
 
 __all__ = ["check_size", "draw", "painted"]
 
-Array = NDArray[np.float64]
-FloatArray = NDArray[np.float32]
 
 #: Smallest picture [pixels].
 MIN_WIDTH, MIN_HEIGHT = 320, 180
@@ -104,7 +102,7 @@ class _Triangles:
         x, y = (seen[:, 0] + 1.0) * width / 2.0, (1.0 - seen[:, 1]) * height / 2.0
         self.screen = np.column_stack([x, y, seen[:, 2]]).reshape(-1, 3, 3)
 
-    def surface(self, found: Fragments) -> tuple[FloatArray, FloatArray]:
+    def surface(self, found: Fragments) -> tuple[Float32Array, Float32Array]:
         """Points and unnormalised normals of fragments [n, 3]."""
         near = self.screen[:, :, 2].astype(np.float32)[found.triangles]
         weights = found.weights * near
@@ -133,7 +131,7 @@ class _Painter:
     def _triangles(self, parts: list[Part]) -> _Triangles:
         return _Triangles(parts, self.camera, self.width, self.height)
 
-    def paint(self) -> FloatArray:
+    def paint(self) -> Float32Array:
         """Linear light [height * width, 3]."""
         light = self._background()
         found = nearest(self.solid.screen, self.width, self.height)
@@ -144,7 +142,7 @@ class _Painter:
         self._paint_marks(light)
         return light
 
-    def _background(self) -> FloatArray:
+    def _background(self) -> Float32Array:
         """A soft gradient, and the shadow on the floor; smooth, so that few pixels do."""
         rows, columns = self.height // COARSE, self.width // COARSE
         x, y = np.meshgrid(np.linspace(-1.0, 1.0, columns), np.linspace(1.0, -1.0, rows))
@@ -164,7 +162,7 @@ class _Painter:
 
     def _shaded(
         self, triangles: _Triangles, found: Fragments, *, shadows: bool = True
-    ) -> tuple[FloatArray, FloatArray]:
+    ) -> tuple[Float32Array, Float32Array]:
         """Light [n, 3] of fragments, and how squarely they face the camera [n]."""
         points, normals = triangles.surface(found)
         to_camera = self.camera.position.astype(np.float32) - points
@@ -175,7 +173,7 @@ class _Painter:
         colours = triangles.colours[found.triangles, :3]
         return shade(colours, normals, to_camera, lit, self.lamps), dots(normals, to_camera)
 
-    def _darken_crevices(self, light: FloatArray) -> None:
+    def _darken_crevices(self, light: Float32Array) -> None:
         near = self.nearness.reshape(self.height, self.width)[::SAMPLES, ::SAMPLES]
         with np.errstate(divide="ignore"):
             depth = 1.0 / near
@@ -183,7 +181,7 @@ class _Painter:
         kept = np.where(near > 0.0, 1.0 - CREVICE * crevices(depth, metre), 1.0).astype(np.float32)
         light *= kept.repeat(SAMPLES, axis=0).repeat(SAMPLES, axis=1).reshape(-1, 1)
 
-    def _paint_clear(self, light: FloatArray) -> None:
+    def _paint_clear(self, light: Float32Array) -> None:
         """Lay see-through surfaces over what is behind them, the farthest first."""
         batches = [
             batch[batch.nearness > self.nearness[batch.pixels]]
@@ -204,7 +202,7 @@ class _Painter:
             pixels, alpha = found.pixels[rows], opacity[rows, None]
             light[pixels] = (1.0 - alpha) * light[pixels] + alpha * shaded[rows]
 
-    def _paint_marks(self, light: FloatArray) -> None:
+    def _paint_marks(self, light: Float32Array) -> None:
         """Let contact points and normals show through what hides them."""
         found = nearest(self.marks.screen, self.width, self.height)
         found = found[found.nearness < self.nearness[found.pixels] - 1e-6]

@@ -6,13 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from graspatlas.support.arrays import Array, BoolArray, Float32Array, IntArray
 
 __all__ = ["Fragments", "fragments", "nearest"]
 
-Array = NDArray[np.float64]
-FloatArray = NDArray[np.float32]
-IntArray = NDArray[np.int64]
 
 #: How many candidate pixels are worked on at a time.
 BATCH = 1 << 19
@@ -35,10 +33,10 @@ class Fragments:
 
     pixels: IntArray
     triangles: IntArray
-    weights: FloatArray
-    nearness: FloatArray
+    weights: Float32Array
+    nearness: Float32Array
 
-    def __getitem__(self, rows: NDArray[np.bool_] | IntArray) -> Fragments:
+    def __getitem__(self, rows: BoolArray | IntArray) -> Fragments:
         return Fragments(self.pixels[rows], self.triangles[rows], self.weights[rows], self.nearness[rows])
 
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from graspatlas.support.arrays import Array, Float32Array
 from graspatlas.viewer.render.raster import nearest
 from graspatlas.viewer.scene.camera import Camera
 
 __all__ = ["FloorShadow", "Lamp", "Shadow", "crevices", "dots", "lamps", "shade", "to_linear", "to_screen"]
 
-Array = NDArray[np.float64]
-FloatArray = NDArray[np.float32]
 
 #: Points are lifted off their surface by this much before they are looked up in a shadow [m].
 LIFT = 0.0015
@@ -26,7 +24,7 @@ CREVICE_REACH = (0.003, 0.007, 0.014)
 FLOOR_PIXEL = 0.0015
 
 
-def dots(a: FloatArray, b: FloatArray) -> FloatArray:
+def dots(a: Float32Array, b: Float32Array) -> Float32Array:
     """Dot products of rows [n, 3] and [n, 3]: [n]."""
     return np.asarray(np.einsum("ij,ij->i", a, b))
 
@@ -63,8 +61,8 @@ def _unit(vector: Array) -> Array:
 
 
 def shade(
-    colour: FloatArray, normals: FloatArray, to_camera: FloatArray, lit: FloatArray, lamps: tuple[Lamp, ...]
-) -> FloatArray:
+    colour: Float32Array, normals: Float32Array, to_camera: Float32Array, lit: Float32Array, lamps: tuple[Lamp, ...]
+) -> Float32Array:
     """Light that surface points send to the camera.
 
     Args:
@@ -92,14 +90,14 @@ def shade(
     return np.asarray(colour * diffuse[:, None] * (1.0 - 0.5 * fresnel[:, None]) + shine[:, None], np.float32)
 
 
-def _softbox(cosine: FloatArray) -> FloatArray:
+def _softbox(cosine: Float32Array) -> Float32Array:
     """Mirror image of a lamp with a soft edge and a wide faint halo."""
     near = np.clip((cosine - 0.90) / 0.08, 0.0, 1.0)
     halo = np.maximum(cosine, 0.0) ** 12
     return np.asarray(0.55 * near * near * (3.0 - 2.0 * near) + 0.18 * halo, np.float32)
 
 
-def crevices(depth: FloatArray, metre: float) -> FloatArray:
+def crevices(depth: Float32Array, metre: float) -> Float32Array:
     """How much light is lost where surfaces meet: [h, w], 0 to 1.
 
     A pixel is dark when the pixels on either side of it are nearer; a flat surface, however steep, is not.
@@ -121,7 +119,7 @@ def crevices(depth: FloatArray, metre: float) -> FloatArray:
     return np.asarray(gaussian_filter(dark / (4 * len(CREVICE_REACH)), 1.5), np.float32)
 
 
-def _shifted(padded: FloatArray, margin: int, x: int, y: int) -> FloatArray:
+def _shifted(padded: Float32Array, margin: int, x: int, y: int) -> Float32Array:
     height, width = padded.shape
     return padded[margin + y : height - margin + y, margin + x : width - margin + x]
 
@@ -147,7 +145,7 @@ class Shadow:
         self._map = np.full(width * height, -1.0, np.float32)
         self._map[found.pixels] = found.nearness
 
-    def lit(self, points: FloatArray, normals: FloatArray) -> FloatArray:
+    def lit(self, points: Float32Array, normals: Float32Array) -> Float32Array:
         """How much of the lamp reaches points [n, 3] with unit normals [n, 3]: [n], 0 to 1, with a soft edge."""
         raised = (points + LIFT * normals) @ self._axes.T.astype(np.float32) - self._origin
         x, y = raised[:, 0] / self._pixel, raised[:, 1] / self._pixel

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from graspatlas.problem.problem import Problem
 from graspatlas.support.arrays import Array
 from graspatlas.viewer.scene.meshes import Mesh, from_coal
 from graspatlas.viewer.scene.stick_figure import Shape, bones, outlines
+
+if TYPE_CHECKING:
+    import pinocchio as pin
 
 __all__ = ["BodyShapes"]
 
@@ -46,7 +49,7 @@ class BodyShapes:
             return outlines(self._problem)
         return self._placed(*self._object, None)
 
-    def _read(self, body: Body) -> tuple[Any, Any, list[Mesh | None]]:
+    def _read(self, body: Body) -> tuple[pin.Model, pin.GeometryModel, list[Mesh | None]]:
         """Pinocchio's model and geometry, and the meshes; collision shapes where a body has no visual ones."""
         import pinocchio as pin
 
@@ -66,7 +69,7 @@ class BodyShapes:
             ) from None
         return model, geometry, [self._mesh(item) for item in geometry.geometryObjects]
 
-    def _mesh(self, item: Any) -> Mesh | None:
+    def _mesh(self, item: pin.GeometryObject) -> Mesh | None:
         if not hasattr(item.geometry, "tri_indices"):
             return from_coal(item.geometry)
         key = (item.meshPath, *item.meshScale)
@@ -75,7 +78,9 @@ class BodyShapes:
         return self._files[key]
 
     @staticmethod
-    def _placed(model: Any, geometry: Any, meshes: list[Mesh | None], q: Array | None) -> Iterator[Shape]:
+    def _placed(
+        model: pin.Model, geometry: pin.GeometryModel, meshes: list[Mesh | None], q: Array | None
+    ) -> Iterator[Shape]:
         import pinocchio as pin
 
         data, geometry_data = model.createData(), geometry.createData()

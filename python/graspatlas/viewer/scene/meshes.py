@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from graspatlas.support.arrays import Array, IntArray
+
+if TYPE_CHECKING:
+    import coal
 
 __all__ = [
     "Mesh",
@@ -184,7 +187,7 @@ def frame_along(direction: Array, origin: Array) -> Array:
     return T
 
 
-def from_coal(geometry: Any) -> Mesh | None:
+def from_coal(geometry: coal.CollisionGeometry) -> Mesh | None:
     """Mesh of a collision library's geometry; None for one that has no surface to show.
 
     Args:

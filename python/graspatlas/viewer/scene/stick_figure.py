@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from graspatlas.problem.problem import Problem
 from graspatlas.support.arrays import Array
 from graspatlas.viewer.scene.meshes import Mesh, capsule, ellipsoid, frame_along, smooth, tube
+
+if TYPE_CHECKING:
+    import pinocchio as pin
 
 __all__ = ["Shape", "bones", "outlines"]
 
@@ -26,7 +29,7 @@ STEPS = 40
 CUT = 0.03
 
 
-def bones(problem: Problem, model: Any, q: Array) -> Iterator[Shape]:
+def bones(problem: Problem, model: pin.Model, q: Array) -> Iterator[Shape]:
     """A hand's joints, and the lines between them and to the fingertips, in the palm's frame.
 
     Args:
@@ -57,7 +60,7 @@ def bone_length(problem: Problem) -> float:
     return float(np.mean([np.linalg.norm(end - start) for start, end in lines]))
 
 
-def _skeleton(problem: Problem, model: Any, q: Array) -> tuple[list[Array], list[tuple[Array, Array]]]:
+def _skeleton(problem: Problem, model: pin.Model, q: Array) -> tuple[list[Array], list[tuple[Array, Array]]]:
     """Origins of the joints, and both ends of the bones."""
     import pinocchio as pin
 

@@ -7,12 +7,11 @@ import json
 from collections.abc import Iterator
 from importlib import resources
 from string import Template
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from graspatlas.support.validation import PlainTable
 from graspatlas.viewer.render.text_images import DARK, GREY, text_image
 from graspatlas.viewer.scene.animation import Film
 from graspatlas.viewer.scene.captions import film_title, index_name, legend
@@ -34,7 +33,6 @@ from graspatlas.viewer.web.threejs import group, mesh, sprite
 
 __all__ = ["film_animation", "film_caption", "film_commands", "film_page"]
 
-Array = NDArray[np.float64]
 
 #: Where the grasps are in the page: left, right, bottom, top; each spans -1 to 1.
 WINDOW = (-0.85, 0.85, -0.62, 0.90)
@@ -58,7 +56,7 @@ def _data(film: Film) -> str:
     """What the player needs, as JSON that may stand inside a script."""
     path, moving = film.path, np.flatnonzero(film.moving)
     rows = film.T[:, moving, :3, :].transpose(0, 1, 3, 2).astype(np.float32)
-    data: dict[str, Any] = {
+    data: PlainTable = {
         "paths": [_place(int(i)) for i in moving],
         "placements": base64.b64encode(np.ascontiguousarray(rows).tobytes()).decode("ascii"),
         "points": film.points.tolist(),

@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from graspatlas.paths.path import Path
 from graspatlas.result.result import Result
@@ -14,7 +14,7 @@ from graspatlas.support.terminal import say
 from graspatlas.viewer.scene.animation import Film
 from graspatlas.viewer.scene.scene import Scene
 from graspatlas.viewer.web.animation_page import film_animation, film_caption, film_commands
-from graspatlas.viewer.web.page import commands
+from graspatlas.viewer.web.page import Command, commands
 
 if TYPE_CHECKING:
     import meshcat
@@ -53,10 +53,10 @@ def close(visualizer: meshcat.Visualizer) -> None:
 class _Command:
     """A command as meshcat's window sends it."""
 
-    def __init__(self, content: dict[str, Any]) -> None:
+    def __init__(self, content: Command) -> None:
         self._content = content
 
-    def lower(self) -> dict[str, Any]:
+    def lower(self) -> Command:
         return self._content
 
 

@@ -10,10 +10,8 @@ from collections.abc import Iterable, Iterator
 from importlib import resources
 from pathlib import Path
 from string import Template
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from graspatlas.errors import GraspAtlasError
@@ -22,7 +20,7 @@ from graspatlas.viewer.render.text_images import caption_image, legend_image
 from graspatlas.viewer.scene.camera import Camera
 from graspatlas.viewer.scene.captions import caption, index_name, legend, subtitle
 from graspatlas.viewer.scene.scene import SHOW_THROUGH, Colour, Part, Scene
-from graspatlas.viewer.web.threejs import ground, group, light, mesh, perspective_camera, sprite
+from graspatlas.viewer.web.threejs import Content, ground, group, light, mesh, perspective_camera, sprite
 
 __all__ = [
     "ASPECT",
@@ -40,8 +38,7 @@ __all__ = [
     "studio",
 ]
 
-Array = NDArray[np.float64]
-Command = dict[str, Any]
+Command = dict[str, object]
 
 #: Path of the scene in meshcat's tree.
 ROOT = "/graspatlas"
@@ -144,12 +141,12 @@ def commands(scene: Scene, *, with_legend: bool = False) -> Iterator[Command]:
     yield from _captions(scene, camera, with_legend)
 
 
-def set_object(path: str, content: dict[str, Any]) -> Command:
+def set_object(path: str, content: Content) -> Command:
     """Command that shows an object at a path of meshcat's tree."""
     return {"type": "set_object", "path": path, "object": content}
 
 
-def set_property(path: str, name: str, value: Any) -> Command:
+def set_property(path: str, name: str, value: object) -> Command:
     return {"type": "set_property", "path": path, "property": name, "value": value}
 
 
@@ -170,7 +167,7 @@ def studio(camera: Camera) -> Iterator[Command]:
     yield set_property("/Cameras/default/rotated/<object>", "position", [x, z, -y])
 
 
-def floor_shadow(parts: Iterable[Part]) -> dict[str, Any]:
+def floor_shadow(parts: Iterable[Part]) -> Content:
     """The shadow of hands and objects on the floor, as a see-through picture."""
     placed = [part.mesh.moved(part.T) for part in parts if part.group in ("hand", "object")]
     floor = FloorShadow(np.concatenate([shape.vertices[shape.faces] for shape in placed]))

@@ -17,7 +17,6 @@ import queue
 import socket
 import threading
 import warnings
-from typing import Any
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.support.validation import shown
@@ -97,7 +96,7 @@ class Server:
             loop.close()
 
 
-class Window(ViewerWindow):  # type: ignore[misc]
+class Window(ViewerWindow):  # type: ignore[misc]  # meshcat has no types
     """Meshcat's window onto a server of ours; its ``server_proc`` is None, since there is no other process.
 
     Args:
@@ -115,7 +114,7 @@ class Window(ViewerWindow):  # type: ignore[misc]
         self.server.close()
 
 
-class _Bridge(MeshcatBridge):  # type: ignore[misc]
+class _Bridge(MeshcatBridge):  # type: ignore[misc]  # meshcat has no types
     """Meshcat's bridge from commands to browsers, on a socket that listens already."""
 
     context = ViewerWindow.context  # what inproc addresses are looked up in
@@ -125,11 +124,11 @@ class _Bridge(MeshcatBridge):  # type: ignore[misc]
         super().__init__(zmq_url=zmq_url, port=listening.getsockname()[1])
         self.web_url = web_url
 
-    def make_app(self) -> Any:
+    def make_app(self) -> tornado.web.Application:
         bridge = self
 
         class Application(tornado.web.Application):
-            def listen(self, port: int, *_: Any, **__: Any) -> Any:
+            def listen(self, port: int, *_: object, **__: object) -> tornado.httpserver.HTTPServer:
                 """Take the socket that there is; tornado would listen on every address."""
                 http = bridge._http = tornado.httpserver.HTTPServer(self)
                 http.add_socket(bridge._listening)
@@ -154,7 +153,7 @@ class _Bridge(MeshcatBridge):  # type: ignore[misc]
         self.ioloop.add_callback(self.ioloop.stop)
 
 
-class _Socket(WebSocketHandler):  # type: ignore[misc]
+class _Socket(WebSocketHandler):  # type: ignore[misc]  # meshcat has no types
     """A browser; it is told the scene, and heard only when a picture was asked for."""
 
     def open(self, *_: str) -> None:
@@ -189,7 +188,7 @@ def _listening(host: str) -> socket.socket:
         ) from None
 
 
-def _bound(one: socket.socket, place: tuple[Any, ...]) -> socket.socket:
+def _bound(one: socket.socket, place: tuple[str | int | bytes, ...]) -> socket.socket:
     """A socket made to listen at an address and port, or closed."""
     try:
         one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

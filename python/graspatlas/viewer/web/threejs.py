@@ -4,24 +4,35 @@ from __future__ import annotations
 
 import base64
 import uuid
-from typing import Any
+from typing import Literal, TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 
+from graspatlas.support.arrays import AnyArray, Array
 from graspatlas.viewer.scene.meshes import Mesh
 from graspatlas.viewer.scene.scene import Colour
 
-__all__ = ["ground", "group", "light", "mesh", "perspective_camera", "sprite"]
+__all__ = ["Content", "ground", "group", "light", "mesh", "perspective_camera", "sprite"]
 
-Array = NDArray[np.float64]
-#: An object with the geometries, materials and images that it needs.
-Content = dict[str, Any]
+Item = dict[str, object]
+Kind = Literal["geometries", "materials", "textures", "images"]
+
+
+class Content(TypedDict, total=False):
+    """An object with the geometries, materials, textures and images that it needs."""
+
+    metadata: Item
+    geometries: list[Item]
+    materials: list[Item]
+    textures: list[Item]
+    images: list[Item]
+    object: Item
+
 
 #: Names and MessagePack codes of the arrays that meshcat reads.
 ARRAYS = {"int16": ("Int16Array", 0x13), "uint32": ("Uint32Array", 0x16), "float32": ("Float32Array", 0x17)}
 #: Names of the lists that stand beside an object.
-LISTS = ("geometries", "materials", "textures", "images")
+LISTS: tuple[Kind, ...] = ("geometries", "materials", "textures", "images")
 #: Half the side of the cube in which the first lamp throws shadows [m].
 SHADOW_REACH = 0.45
 
@@ -37,7 +48,7 @@ def mesh(shape: Mesh, T: Array, colour: Colour, *, through: float = 0.0) -> Cont
     """
     opacity = through or colour[3]
     clear = opacity < 1.0
-    material = {
+    material: Item = {
         "uuid": _name(),
         "type": "MeshPhongMaterial",
         "color": _number(colour),
@@ -110,7 +121,7 @@ def ground(png: bytes, low: Array, high: Array) -> Content:
     }
     index = _packed(np.array([[0, 1, 2], [0, 2, 3]], np.uint32))
     look = {"type": "MeshBasicMaterial", "map": texture, "transparent": True, "depthWrite": False, "side": 0}
-    content = {
+    content: Content = {
         "geometries": [
             {"uuid": geometry, "type": "BufferGeometry", "data": {"attributes": attributes, "index": index}}
         ],
@@ -150,15 +161,15 @@ def perspective_camera(field_of_view: float) -> Content:
     return {"object": {"uuid": _name(), "type": "PerspectiveCamera", **lens}}
 
 
-def _image(name: str, png: bytes) -> dict[str, Any]:
+def _image(name: str, png: bytes) -> Item:
     return {"uuid": name, "url": "data:image/png;base64," + base64.b64encode(png).decode("ascii")}
 
 
-def _texture(name: str, image: str) -> dict[str, Any]:
+def _texture(name: str, image: str) -> Item:
     return {"uuid": name, "image": image, "wrap": [1001, 1001], "repeat": [1, 1], "anisotropy": 4}
 
 
-def _geometry(shape: Mesh) -> dict[str, Any]:
+def _geometry(shape: Mesh) -> Item:
     normals = np.round(32767.0 * shape.normals).astype(np.int16)
     return {
         "uuid": str(uuid.uuid5(uuid.NAMESPACE_OID, str(id(shape)))),
@@ -173,7 +184,7 @@ def _geometry(shape: Mesh) -> dict[str, Any]:
     }
 
 
-def _packed(rows: NDArray[Any]) -> dict[str, Any]:
+def _packed(rows: AnyArray) -> Item:
     import umsgpack
 
     kind, code = ARRAYS[rows.dtype.name]

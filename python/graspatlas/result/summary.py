@@ -1,0 +1,99 @@
+"""What the summary of a result holds; docs/results.md says what its entries mean."""
+
+from __future__ import annotations
+
+from typing import TypedDict
+
+from typing_extensions import NotRequired
+
+__all__ = [
+    "AuditSummary",
+    "GraspSummary",
+    "OtherSummary",
+    "QualitySummary",
+    "RefinementSummary",
+    "ResultSummary",
+    "SecondsSummary",
+]
+
+
+class AuditSummary(TypedDict):
+    """The audit of the atlas."""
+
+    points: int
+    holes: int
+    share_missing: float
+    confidence: float
+
+
+class SecondsSummary(TypedDict):
+    """How long the parts took [s]."""
+
+    atlas: float
+    audit: float
+    quality: float
+
+
+class QualitySummary(TypedDict):
+    """The index; None where no grasp meets the requirements."""
+
+    name: str
+    best: float | None
+    worst: float | None
+    at_x1: float
+
+
+class GraspSummary(TypedDict):
+    """A chart's grasp."""
+
+    q: list[float]
+    object_xyz: list[float]
+    object_quat_xyzw: list[float]
+    chart: int
+
+
+class OtherSummary(TypedDict):
+    """Another index at the best grasp, and its largest value over the grasps that meet the requirements."""
+
+    at_best: float | None
+    largest: NotRequired[float]
+
+
+class RefinementSummary(TypedDict):
+    """The best of the refined maxima; no gain where the index grows without bound."""
+
+    quality: float
+    gain: float | None
+    status: str
+    converged: bool
+    steps: int
+    n_peaks: int
+    n_unbounded: int
+    advice: str
+    all_motions: bool
+    complete: bool
+    q: list[float]
+    object_xyz: list[float]
+    object_quat_xyzw: list[float]
+
+
+class ResultSummary(TypedDict):
+    """A result in plain data; best is None where no grasp meets the requirements."""
+
+    problem: str
+    dimension: int
+    radius: float
+    epsilon: float
+    length_scale: float
+    torque_length: float
+    status: str
+    is_global: bool
+    doubts: list[str]
+    audit: AuditSummary
+    n_charts: int
+    seconds: SecondsSummary
+    max_residual: float
+    quality: QualitySummary
+    best: GraspSummary | None
+    others: NotRequired[dict[str, OtherSummary]]
+    refined: NotRequired[RefinementSummary]
