@@ -51,6 +51,11 @@ def planar_result() -> ga.Result:
 
 
 @pytest.fixture(scope="session")
+def gripper() -> ga.Result:
+    return ga.optimize(ga.load_problem("gripper_skittle"), refine=True)
+
+
+@pytest.fixture(scope="session")
 def sphere() -> ga.Atlas:
     return ga.build_atlas(ga.systems.Sphere(3), [0.0, 0.0, 1.0], radius=0.1, epsilon=0.1)
 

@@ -18,6 +18,8 @@ import graspatlas as ga
 from graspatlas import _core
 
 Array = NDArray[np.float64]
+#: Where a patch is that is turned and moved.
+AXIS = {"origin": (0.01, -0.02, 0.03), "axis": (0.3, -0.9, 0.2), "u_axis": (0.1, 0.2, 0.7)}
 DATA = Path(__file__).parent / "data"
 ROOT = Path(__file__).parents[1]
 
@@ -217,3 +219,28 @@ def changed(array: Array, index: Any, value: Any) -> Array:
     out = array.copy()
     out[index] = value
     return out
+
+
+def assert_complete_and_holding(result: ga.Result) -> None:
+    """The atlas is complete, all is verified again, and the best grasp holds and is better than x1."""
+    assert result.atlas.complete
+    assert result.dimension == 2
+    report = result.check()
+    assert report, report
+    assert {type(r) for r in result.requirements} == {ga.ForceClosure, ga.CollisionFree}
+    assert 0.02 < result.accepted.mean() < 0.98
+    best = result.refined_best
+    assert best.quality >= result.best.quality > 1.5 * result.worst.quality
+    assert result.best.quality > 1.2 * result.qualities[0]  # x1 is not the answer
+
+
+def assert_meshes_are_made_again(folder: str, patch: Any, tmp_path: Path) -> None:
+    """The meshes in a folder of robots/ are those of its script, whose outline is that of the patch."""
+    script = load_script(folder)
+    np.testing.assert_allclose((patch.heights, patch.radii), (script.HEIGHTS, script.RADII), atol=1e-12)
+    kept = script.FOLDER
+    script.FOLDER = tmp_path
+    script.main()
+    for path in tmp_path.iterdir():
+        assert path.read_text() == (kept / path.name).read_text(), path.name
+    assert len(list(tmp_path.iterdir())) == len(list(kept.glob("*.obj")))

@@ -161,6 +161,7 @@ def test_figure_shows_the_front(planar_result: ga.Result) -> None:
     assert len(figure.axes) == 4  # the front; both ends and the knee
 
 
+@pytest.mark.slow
 def test_figure_of_a_hand_in_space(small_result: ga.Result) -> None:
     figure = ga.plot_pareto(small_result, VOLUME, "smallest_semi_axis")
     assert len(figure.axes) > 1

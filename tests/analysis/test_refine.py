@@ -29,10 +29,15 @@ def can() -> ga.Result:
     ("name", "require", "quality"),
     [
         ("planar_hand", (), "inverse_condition_number"),
-        ("planar_hand", (ga.ForceClosure(0.5, 0.11),), "manipulability_volume"),
-        ("schunk_can", HOLDS, "manipulability_volume"),
-        ("schunk_oil_bottle", (ga.CollisionFree(),), "manipulability_volume"),
-        ("schunk_oil_bottle", (ga.ForceClosure(1.0),), "smallest_semi_axis"),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in (
+                ("planar_hand", (ga.ForceClosure(0.5, 0.11),), "manipulability_volume"),
+                ("schunk_can", HOLDS, "manipulability_volume"),
+                ("schunk_oil_bottle", (ga.CollisionFree(),), "manipulability_volume"),
+                ("schunk_oil_bottle", (ga.ForceClosure(1.0),), "smallest_semi_axis"),
+            )
+        ),
     ],
 )
 def test_the_refined_best_does_not_depend_on_the_radius(name: str, require: tuple, quality: str) -> None:

@@ -301,6 +301,7 @@ def interrupt(words: list[str], folder: Path) -> subprocess.CompletedProcess[str
     return subprocess.CompletedProcess(process.args, process.returncode, out.decode(), (seen + err).decode())
 
 
+@pytest.mark.slow
 def test_interrupted(tmp_path):
     words = ["optimize", "schunk_oil_bottle", "--dimension", "3", "--radius", "0.03", "--output", "out", "--json"]
     words += ["--require", "none"]

@@ -48,6 +48,7 @@ def test_commands_exist():
         assert (DOCS.parent / script).is_file(), script
 
 
+@pytest.mark.slow
 def test_the_script_makes_the_picture(tmp_path):
     words = [str(DOCS / "make_gallery.py"), "planar_hand", "--output", str(tmp_path)]
     done = subprocess.run([sys.executable, "-W", "error", *words], capture_output=True, text=True, timeout=120)

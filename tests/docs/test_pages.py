@@ -19,6 +19,7 @@ ELSEWHERE = ("results.md",)
 PAGES = [page.name for page in sorted(DOCS.glob("*.md")) if page.name not in ELSEWHERE]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
 def test_the_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -30,6 +31,15 @@ def test_the_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
             run.run(block)
         except Exception as error:
             raise AssertionError(f"docs/{page}:{block.line}: {error}") from error
+
+
+def test_pages_say_what_their_blocks_are() -> None:
+    """And what is Python compiles: the pages themselves are run by the slow tests."""
+    blocks = [(page, block) for page in PAGES for block in blocks_of(page)]
+    assert len(blocks) > 50
+    for page, block in blocks:
+        if block.language == "python" and block.word != "not run":
+            compile("\n" * block.line + block.text, str(DOCS / page), "exec")
 
 
 def test_the_example_is_the_file_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

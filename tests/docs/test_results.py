@@ -17,6 +17,7 @@ PAGE = "results.md"
 TEXT = read(PAGE)
 
 
+@pytest.mark.slow
 def test_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands first, then one program in Python; each part with what it leaves."""
     monkeypatch.chdir(tmp_path)

@@ -395,7 +395,7 @@ PROGRAM = [sys.executable, "-m", "graspatlas"]
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no full device")
 @pytest.mark.parametrize(
-    "words", slow_but([["list"], ["schema"], ["--help"], ["--version"], ["optimize", "--help"]], ["list"], ["--help"])
+    "words", slow_but([["list"], ["schema"], ["--help"], ["--version"], ["optimize", "--help"]], ["list"])
 )
 @pytest.mark.parametrize("buffered", slow_but(["", "1"], ""))
 def test_a_full_disk(words: list[str], buffered: str) -> None:

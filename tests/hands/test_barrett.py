@@ -90,6 +90,7 @@ def test_the_hand_closes_as_published(problem):
     assert all(behind[f"f{i}_outer_link"][1, 3] > 0.0 > open_[f"f{i}_outer_link"][1, 3] for i in (1, 2))
 
 
+@pytest.mark.slow
 def test_grasps_found_as_a_start_let_an_atlas_grow(problem):
     """Some grasps of this hand are singular: an atlas cannot grow from them, and a search for components goes on."""
     search = GraspSearch(problem, 2, seed=0)

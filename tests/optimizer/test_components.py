@@ -244,6 +244,7 @@ def test_a_problem_is_needed():
 # The command line -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_command_line(cli, tmp_path):
     words = ("optimize", "planar_hand", "--components", "--radius", "0.2", "--output", tmp_path)
     status, out, _ = cli(*words)

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from helpers import AXIS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -26,8 +27,6 @@ from graspatlas.patches import (
     patch_from_dict,
 )
 from graspatlas.testing import check_patch
-
-AXIS = {"origin": (0.01, -0.02, 0.03), "axis": (0.3, -0.9, 0.2), "u_axis": (0.1, 0.2, 0.7)}
 
 
 def wavy(p: int, q: int) -> np.ndarray:

@@ -8,6 +8,7 @@ from math import comb
 
 import numpy as np
 import pytest
+from helpers import AXIS
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import NdBSpline
@@ -29,7 +30,6 @@ from graspatlas.patches import (
     patch_from_dict,
 )
 
-AXIS = {"origin": (0.01, -0.02, 0.03), "axis": (0.3, -0.9, 0.2), "u_axis": (0.1, 0.2, 0.7)}
 angles = st.floats(-3.0, 3.0)
 latitudes = st.floats(-1.4, 1.4)
 shares = st.floats(0.0, 1.0)

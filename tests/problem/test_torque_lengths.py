@@ -40,6 +40,7 @@ def test_no_grasp_plays_a_part(name: str) -> None:
     assert arms.max() <= problem.torque_arm * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
 def test_components_of_one_optimum_are_ranked_alike() -> None:
     """The cup's two components mirror one another; which of them has x1 is left to chance."""
     first = ga.load_problem("three_finger_cup")

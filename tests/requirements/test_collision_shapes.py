@@ -199,6 +199,7 @@ def test_dents_are_told_from_solids_in_large_meshes_too():
             assert convex_solid(Shape("mesh", points=points, triangles=triangles)).kind == kind
 
 
+@pytest.mark.slow
 def test_fingertips_of_many_corners_collide_as_balls_do(grasps, tmp_path):
     problem, X = grasps
     path = write_stl(tmp_path / "tip.stl", *round_mesh(60, 100, np.full(3, 0.012)))
@@ -220,6 +221,7 @@ def test_fingertips_of_many_corners_collide_as_balls_do(grasps, tmp_path):
     assert not [finding for finding in diagnose(problem, radius=0.5) if finding.subject == "collision hulls"]
 
 
+@pytest.mark.slow
 def test_a_mesh_of_a_million_faces_is_read_in_seconds(tmp_path):
     path = write_stl(tmp_path / "tip.stl", *round_mesh(700, 720, (0.01, 0.01, 0.02)))
     start = time.process_time()

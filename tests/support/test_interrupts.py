@@ -123,7 +123,7 @@ def test_ctrl_c_twice_keeps_the_charts_in_a_program(tmp_path: Path, script: str)
 
 @pytest.mark.parametrize(
     ("signals", "code"),
-    [([(0.0, CTRL_C), (0.1, CTRL_C)], 130), ([(0.0, TERMINATE)], 143)],
+    [([(0.0, CTRL_C), (0.1, CTRL_C)], 130), pytest.param([(0.0, TERMINATE)], 143, marks=pytest.mark.slow)],
     ids=["Ctrl-C twice", "terminated"],
 )
 def test_the_command_line_keeps_a_checkpoint_and_the_result(

@@ -135,11 +135,11 @@ def test_a_browser_is_told_the_scene_and_not_heard(can_result: ga.Result) -> Non
     assert not visualizer.window.server.running
 
 
-def test_hosts(can_result: ga.Result) -> None:
+def test_hosts(planar_result: ga.Result) -> None:
     for host in ("", "no.such.host.invalid", "203.0.113.7", "a\0b", 7):
         with pytest.raises(ga.GraspAtlasError, match="host"):
-            view(can_result, open_browser=False, wait=False, host=host)  # type: ignore[arg-type]
-    visualizer = view(can_result, open_browser=False, wait=False, host="0.0.0.0")
+            view(planar_result, open_browser=False, wait=False, host=host)  # type: ignore[arg-type]
+    visualizer = view(planar_result, open_browser=False, wait=False, host="0.0.0.0")
     try:
         assert visualizer.url().startswith("http://127.0.0.1:")
     finally:

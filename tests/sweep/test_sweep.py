@@ -78,6 +78,7 @@ def test_a_run_is_known_by_its_content() -> None:
     assert run.key != Run("planar_hand", {**problem, "length_scale": 0.2}, radius=0.2).key
 
 
+@pytest.mark.slow
 def test_a_run_that_cannot_be_solved_is_a_row(tmp_path: Path) -> None:
     sweep = run_sweep(["planar_hand"], tmp_path, dimensions=[9], workers=1)
     (row,) = sweep.failed
@@ -86,6 +87,7 @@ def test_a_run_that_cannot_be_solved_is_a_row(tmp_path: Path) -> None:
     assert again.skipped == 0, "a failed run is tried again"
 
 
+@pytest.mark.slow
 def test_an_interrupted_sweep_keeps_their_rows(tmp_path: Path) -> None:
     words = [
         sys.executable,
@@ -116,6 +118,7 @@ def test_an_interrupted_sweep_keeps_their_rows(tmp_path: Path) -> None:
     assert sweep.missing == 0
 
 
+@pytest.mark.slow
 def test_the_command_line_sweeps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["sweep", "planar_hand", "--radius", "0.3", "--workers", "1", "--refine", "--output", str(tmp_path)]
     assert main(words) == 0

@@ -80,6 +80,7 @@ def test_a_path_is_served(path: ga.GraspPath, capsys: pytest.CaptureFixture[str]
         close(visualizer)
 
 
+@pytest.mark.slow
 def test_strip_shows_six_grasps(path: ga.GraspPath, tmp_path: Path) -> None:
     save_picture(path, tmp_path / "strip.png", width=480, height=270)
     shown = pixels(tmp_path / "strip.png")
@@ -123,6 +124,7 @@ def test_slider_moves_the_grasp(path: ga.GraspPath, tmp_path: Path) -> None:
     assert f"arc length {path.arc_length[film.points[17]]:.3f} of {path.length:.3f}" in text
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 def test_film_page_opens_at_the_frame_of_its_address(path: ga.GraspPath, tmp_path: Path) -> None:
     export_html(path, tmp_path / "path.html")

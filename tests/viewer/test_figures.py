@@ -65,6 +65,7 @@ def test_figures_of_a_planar_result_are_drawn(planar_result: ga.Result, name: st
     assert_drawn(DRAWN[name](planar_result))
 
 
+@pytest.mark.slow
 def test_figures_of_a_hand_in_space_are_drawn(small_result: ga.Result) -> None:
     assert_drawn(figures.plot_best_and_worst(small_result, label="volume"))
     assert_drawn(figures.plot_local_maxima(small_result))

@@ -76,6 +76,7 @@ def test_picture_shows_hand_and_object_on_both_sides(picture: Array) -> None:
         assert share(half, "red") > 0.0001
 
 
+@pytest.mark.slow
 def test_picture_shows_the_can(can_result: ga.Result, tmp_path: Path) -> None:
     save_picture(can_result, tmp_path / "can.png", width=480, height=270)
     assert share(pixels(tmp_path / "can.png"), "blue") > 0.0001
