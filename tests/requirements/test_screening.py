@@ -100,7 +100,7 @@ def test_refusals_are_counted_cheapest_first() -> None:
     problem = ga.load_problem("schunk_can")
     require = [ga.CollisionFree(), ga.ForceClosure(FRICTION), ga.JointMargin(0.05)]
     result = ga.optimize(problem, radius=0.4, require=require)
-    assert [name.split(":")[0] for name in result.refused] == ["joint_margin", "force_closure", "collision_free"]
+    assert [name.split(":")[0] for name in result.rejected] == ["joint_margin", "force_closure", "collision_free"]
     assert sum(result.rejected.values()) + result.accepted.sum() == result.atlas.n_charts
     lower, upper = problem.hand.joint_limits
     q = result.best.q
