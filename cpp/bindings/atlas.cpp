@@ -1,4 +1,4 @@
-#include "graspatlas/continuation/atlas.hpp"
+#include "graspatlas/atlas/atlas.hpp"
 
 #include <pybind11/stl.h>
 
@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "bindings.hpp"
-#include "graspatlas/continuation/flat_atlas.hpp"
+#include "graspatlas/atlas/flat_atlas.hpp"
 #include "graspatlas/errors.hpp"
 
 namespace py = pybind11;

@@ -23,7 +23,8 @@ pybind11::array_t<T> matrix(pybind11::ssize_t rows, pybind11::ssize_t columns) {
 /// What __reduce__ returns.
 using Reduced = pybind11::typing::Tuple<pybind11::object, pybind11::ellipsis>;
 
-/// What __reduce__ returns for an object of a compiled class, or of its subclass in Python; see graspatlas/support/pickling.py.
+/// What __reduce__ returns for an object of a compiled class, or of its subclass in Python; see
+/// graspatlas/support/pickling.py.
 Reduced reduced(const pybind11::object& self, const pybind11::type& base, const pybind11::tuple& arguments);
 
 /// __reduce__ of the class C: its objects are pickled and copied by the arguments of its constructor, which

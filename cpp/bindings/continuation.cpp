@@ -6,12 +6,12 @@
 #include <string>
 
 #include "bindings.hpp"
-#include "graspatlas/continuation/lease.hpp"
 #include "graspatlas/continuation/neighbours.hpp"
-#include "graspatlas/continuation/newton.hpp"
 #include "graspatlas/continuation/polytope.hpp"
-#include "graspatlas/continuation/toy_systems.hpp"
 #include "graspatlas/errors.hpp"
+#include "graspatlas/manifold/lease.hpp"
+#include "graspatlas/manifold/newton.hpp"
+#include "graspatlas/manifold/toy_systems.hpp"
 #include "graspatlas/parallel.hpp"
 
 namespace py = pybind11;

@@ -7,12 +7,12 @@
 #include <string>
 
 #include "bindings.hpp"
-#include "graspatlas/continuation/lease.hpp"
 #include "graspatlas/errors.hpp"
 #include "graspatlas/grasp/bspline_patch.hpp"
 #include "graspatlas/grasp/derived_patch.hpp"
 #include "graspatlas/grasp/grasp_system.hpp"
 #include "graspatlas/grasp/round_patch.hpp"
+#include "graspatlas/manifold/lease.hpp"
 
 namespace py = pybind11;
 

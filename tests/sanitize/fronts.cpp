@@ -4,7 +4,7 @@
 #include "graspatlas/continuation/checkpoint.hpp"
 #include "graspatlas/continuation/front.hpp"
 #include "graspatlas/continuation/task_window.hpp"
-#include "graspatlas/continuation/toy_systems.hpp"
+#include "graspatlas/manifold/toy_systems.hpp"
 #include "strain.hpp"
 
 namespace strain {

@@ -3,9 +3,9 @@
 #include <array>
 #include <limits>
 
-#include "graspatlas/continuation/atlas.hpp"
-#include "graspatlas/continuation/lease.hpp"
+#include "graspatlas/atlas/atlas.hpp"
 #include "graspatlas/grasp/grasp_system.hpp"
+#include "graspatlas/manifold/lease.hpp"
 #include "graspatlas/quality/force_closure.hpp"
 #include "graspatlas/quality/manipulability.hpp"
 #include "strain.hpp"

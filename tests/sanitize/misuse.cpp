@@ -1,8 +1,8 @@
 #include <limits>
 #include <memory>
 
-#include "graspatlas/continuation/atlas.hpp"
-#include "graspatlas/continuation/toy_systems.hpp"
+#include "graspatlas/atlas/atlas.hpp"
+#include "graspatlas/manifold/toy_systems.hpp"
 #include "strain.hpp"
 
 namespace strain {

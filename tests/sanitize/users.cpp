@@ -2,10 +2,10 @@
 #include <memory>
 #include <vector>
 
-#include "graspatlas/continuation/atlas.hpp"
-#include "graspatlas/continuation/lease.hpp"
-#include "graspatlas/continuation/newton.hpp"
-#include "graspatlas/continuation/toy_systems.hpp"
+#include "graspatlas/atlas/atlas.hpp"
+#include "graspatlas/manifold/lease.hpp"
+#include "graspatlas/manifold/newton.hpp"
+#include "graspatlas/manifold/toy_systems.hpp"
 #include "strain.hpp"
 
 namespace strain {

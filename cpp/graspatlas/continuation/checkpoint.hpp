@@ -5,7 +5,7 @@
 
 #include "graspatlas/continuation/chart.hpp"
 #include "graspatlas/continuation/front.hpp"
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/manifold/system.hpp"
 
 namespace graspatlas {
 

@@ -6,13 +6,13 @@
 #include <vector>
 
 #include "graspatlas/clock.hpp"
-#include "graspatlas/continuation/bound_check.hpp"
 #include "graspatlas/continuation/charts.hpp"
 #include "graspatlas/continuation/neighbour_test.hpp"
-#include "graspatlas/continuation/newton.hpp"
 #include "graspatlas/continuation/options.hpp"
 #include "graspatlas/continuation/polytope.hpp"
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/manifold/bound_check.hpp"
+#include "graspatlas/manifold/newton.hpp"
+#include "graspatlas/manifold/system.hpp"
 
 namespace graspatlas {
 

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "graspatlas/continuation/newton.hpp"
-#include "graspatlas/continuation/system.hpp"
-#include "graspatlas/continuation/tangent.hpp"
+#include "graspatlas/manifold/newton.hpp"
+#include "graspatlas/manifold/system.hpp"
+#include "graspatlas/manifold/tangent.hpp"
 
 namespace graspatlas {
 

@@ -9,7 +9,7 @@
 
 #include "graspatlas/clock.hpp"
 #include "graspatlas/continuation/front.hpp"
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/manifold/system.hpp"
 
 namespace graspatlas {
 

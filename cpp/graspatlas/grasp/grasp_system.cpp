@@ -6,8 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include "graspatlas/continuation/angle.hpp"
 #include "graspatlas/errors.hpp"
+#include "graspatlas/manifold/angle.hpp"
 
 namespace graspatlas {
 

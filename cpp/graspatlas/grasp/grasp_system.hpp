@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "graspatlas/continuation/system.hpp"
 #include "graspatlas/grasp/model.hpp"
 #include "graspatlas/grasp/object_joint.hpp"
 #include "graspatlas/grasp/patch.hpp"
 #include "graspatlas/grasp/placement.hpp"
+#include "graspatlas/manifold/system.hpp"
 #include "graspatlas/types.hpp"
 
 namespace graspatlas {

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "graspatlas/continuation/quaternion.hpp"
 #include "graspatlas/errors.hpp"
+#include "graspatlas/manifold/quaternion.hpp"
 
 namespace graspatlas {
 

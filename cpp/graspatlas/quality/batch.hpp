@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "graspatlas/clock.hpp"
-#include "graspatlas/continuation/lease.hpp"
 #include "graspatlas/grasp/grasp_system.hpp"
+#include "graspatlas/manifold/lease.hpp"
 #include "graspatlas/parallel.hpp"
 
 namespace graspatlas {

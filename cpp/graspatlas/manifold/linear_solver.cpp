@@ -1,4 +1,4 @@
-#include "graspatlas/continuation/linear_solver.hpp"
+#include "graspatlas/manifold/linear_solver.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #include <memory>
 #include <utility>
 
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/manifold/system.hpp"
 
 namespace graspatlas {
 

@@ -1,4 +1,4 @@
-#include "graspatlas/continuation/flat_atlas.hpp"
+#include "graspatlas/atlas/flat_atlas.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "graspatlas/continuation/walker.hpp"
+#include "graspatlas/audit/walker.hpp"
 
 namespace graspatlas {
 

@@ -1,10 +1,10 @@
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/manifold/system.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "graspatlas/continuation/tangent.hpp"
 #include "graspatlas/errors.hpp"
+#include "graspatlas/manifold/tangent.hpp"
 
 namespace graspatlas {
 

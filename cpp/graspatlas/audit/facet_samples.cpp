@@ -1,4 +1,4 @@
-#include "graspatlas/continuation/facet_samples.hpp"
+#include "graspatlas/audit/facet_samples.hpp"
 
 #include <algorithm>
 #include <cmath>

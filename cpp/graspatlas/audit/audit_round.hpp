@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "graspatlas/continuation/auditor.hpp"
+#include "graspatlas/audit/auditor.hpp"
 #include "graspatlas/continuation/charts.hpp"
 #include "graspatlas/continuation/checkpoint.hpp"
 #include "graspatlas/continuation/front.hpp"

@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "graspatlas/continuation/linear_solver.hpp"
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/manifold/linear_solver.hpp"
+#include "graspatlas/manifold/system.hpp"
 
 namespace graspatlas {
 

@@ -1,4 +1,4 @@
-#include "graspatlas/continuation/quaternion.hpp"
+#include "graspatlas/manifold/quaternion.hpp"
 
 #include <Eigen/Geometry>
 #include <cmath>

@@ -4,15 +4,15 @@
 #include <memory>
 #include <vector>
 
-#include "graspatlas/continuation/audit_round.hpp"
-#include "graspatlas/continuation/auditor.hpp"
+#include "graspatlas/audit/audit_round.hpp"
+#include "graspatlas/audit/auditor.hpp"
 #include "graspatlas/continuation/charts.hpp"
 #include "graspatlas/continuation/checkpoint.hpp"
 #include "graspatlas/continuation/expander.hpp"
 #include "graspatlas/continuation/front.hpp"
 #include "graspatlas/continuation/options.hpp"
-#include "graspatlas/continuation/system.hpp"
 #include "graspatlas/continuation/task_window.hpp"
+#include "graspatlas/manifold/system.hpp"
 
 namespace graspatlas {
 

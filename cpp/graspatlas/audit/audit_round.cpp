@@ -1,4 +1,4 @@
-#include "graspatlas/continuation/audit_round.hpp"
+#include "graspatlas/audit/audit_round.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "graspatlas/continuation/rank_search.hpp"
+#include "graspatlas/audit/rank_search.hpp"
 
 #include <algorithm>
 #include <cmath>

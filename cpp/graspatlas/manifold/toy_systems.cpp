@@ -1,11 +1,11 @@
-#include "graspatlas/continuation/toy_systems.hpp"
+#include "graspatlas/manifold/toy_systems.hpp"
 
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "graspatlas/continuation/angle.hpp"
-#include "graspatlas/continuation/quaternion.hpp"
 #include "graspatlas/errors.hpp"
+#include "graspatlas/manifold/angle.hpp"
+#include "graspatlas/manifold/quaternion.hpp"
 
 namespace graspatlas {
 

@@ -5,15 +5,15 @@
 #include <memory>
 #include <vector>
 
-#include "graspatlas/continuation/bound_check.hpp"
-#include "graspatlas/continuation/bound_manifold.hpp"
+#include "graspatlas/audit/facet_samples.hpp"
+#include "graspatlas/audit/random.hpp"
+#include "graspatlas/audit/rank_search.hpp"
+#include "graspatlas/audit/walker.hpp"
 #include "graspatlas/continuation/charts.hpp"
-#include "graspatlas/continuation/facet_samples.hpp"
 #include "graspatlas/continuation/options.hpp"
-#include "graspatlas/continuation/random.hpp"
-#include "graspatlas/continuation/rank_search.hpp"
-#include "graspatlas/continuation/system.hpp"
-#include "graspatlas/continuation/walker.hpp"
+#include "graspatlas/manifold/bound_check.hpp"
+#include "graspatlas/manifold/bound_manifold.hpp"
+#include "graspatlas/manifold/system.hpp"
 
 namespace graspatlas {
 

@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "graspatlas/continuation/bound_check.hpp"
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/manifold/bound_check.hpp"
+#include "graspatlas/manifold/system.hpp"
 
 namespace graspatlas {
 

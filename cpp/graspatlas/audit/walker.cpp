@@ -1,4 +1,4 @@
-#include "graspatlas/continuation/walker.hpp"
+#include "graspatlas/audit/walker.hpp"
 
 #include <algorithm>
 #include <cmath>

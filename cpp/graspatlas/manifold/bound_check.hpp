@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "graspatlas/continuation/system.hpp"
+#include "graspatlas/manifold/system.hpp"
 
 namespace graspatlas {
 

@@ -1,4 +1,4 @@
-#include "graspatlas/continuation/atlas.hpp"
+#include "graspatlas/atlas/atlas.hpp"
 
 #include <algorithm>
 #include <cmath>

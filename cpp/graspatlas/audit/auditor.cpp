@@ -1,4 +1,4 @@
-#include "graspatlas/continuation/auditor.hpp"
+#include "graspatlas/audit/auditor.hpp"
 
 #include <algorithm>
 #include <cmath>

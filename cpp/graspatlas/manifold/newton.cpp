@@ -1,4 +1,4 @@
-#include "graspatlas/continuation/newton.hpp"
+#include "graspatlas/manifold/newton.hpp"
 
 #include <Eigen/SVD>
 #include <algorithm>

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "graspatlas/continuation/atlas.hpp"
+#include "graspatlas/atlas/atlas.hpp"
 
 namespace graspatlas {
 

@@ -2,12 +2,12 @@
 
 #include <vector>
 
-#include "graspatlas/continuation/bound_check.hpp"
 #include "graspatlas/continuation/neighbour_test.hpp"
-#include "graspatlas/continuation/newton.hpp"
 #include "graspatlas/continuation/options.hpp"
-#include "graspatlas/continuation/system.hpp"
-#include "graspatlas/continuation/tangent.hpp"
+#include "graspatlas/manifold/bound_check.hpp"
+#include "graspatlas/manifold/newton.hpp"
+#include "graspatlas/manifold/system.hpp"
+#include "graspatlas/manifold/tangent.hpp"
 
 namespace graspatlas {
 
