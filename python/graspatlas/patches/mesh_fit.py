@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ["FitReport", "patch_from_mesh"]
 
-Indices = IntArray
-
 #: Degree of the fitted spline.
 DEGREE = 3
 #: Points along each side of the grid at which heights are read off the mesh.
@@ -144,7 +142,7 @@ def _trimesh() -> ModuleType:
         raise GraspAtlasError("fitting to a mesh needs trimesh; install it: pip install graspatlas[mesh]") from None
 
 
-def _loaded(mesh: str | Path | trimesh.Trimesh) -> tuple[Array, Indices]:
+def _loaded(mesh: str | Path | trimesh.Trimesh) -> tuple[Array, IntArray]:
     """Vertices (v, 3) and faces (n, 3) of a mesh, with equal vertices made one."""
     trimesh = _trimesh()
     if isinstance(mesh, str | Path):
@@ -197,7 +195,7 @@ def _tangent_frame(triangles: Array, center: Array, half: float, u_hint: Vector3
     return nearest, origin, np.column_stack([T[:3, 0], -T[:3, 2], T[:3, 1]])
 
 
-def _region(corners: Array, faces: Indices, nearest: int, half: float) -> Indices:
+def _region(corners: Array, faces: IntArray, nearest: int, half: float) -> IntArray:
     """Faces (m, 3) over the square of the patch that hang together with the nearest one, checked to be a manifold."""
     over = np.flatnonzero(_overlapping(corners[faces][:, :, :2], half))
     directed = faces[over][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
