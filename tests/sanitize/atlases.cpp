@@ -172,7 +172,9 @@ std::int64_t trace(System& system, const std::vector<double>& x0, double radius,
   finish(atlas);
   check(atlas, radius);
   Atlas other(system, x0.data(), options(radius, epsilon), 3);
-  for (std::int64_t limit = 50; !other.complete(); limit += 50) other.expand(limit, 1e-4);
+  // In slices that grow, so that they come to be longer than threads take to start, however slow that is.
+  double seconds = 1e-4;
+  for (std::int64_t limit = 50; !other.complete(); limit += 50, seconds *= 1.1) other.expand(limit, seconds);
   finish(other);
   require_same(atlas, other, "threads make the same atlas");
   if (size > 0.0) require(std::abs(covered(atlas) / size - 1.0) < 0.05, "the charts cover the whole");
