@@ -82,7 +82,7 @@ def test_there_are_examples():
 
 @pytest.mark.parametrize(
     "path",
-    slow_but(EXAMPLES, ROOT / "examples" / "sphere.py", ROOT / "examples" / "export_grasps.py"),
+    slow_but(EXAMPLES, ROOT / "examples" / "sphere.py"),
     ids=lambda p: p.stem,
 )
 def test_example_runs(path, tmp_path):

@@ -202,6 +202,7 @@ def test_an_interrupted_climb_in_f_keeps_those_in_r(monkeypatch: pytest.MonkeyPa
     np.testing.assert_array_equal(kept.qualities, inside.qualities)
 
 
+@pytest.mark.slow
 def test_the_command_line_refines(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["optimize", "planar_hand", "--refine", "--quality", "inverse_condition_number"]
     words += ["--quality", "smallest_semi_axis", "--output", str(tmp_path)]
@@ -218,6 +219,7 @@ def test_the_command_line_refines(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "among all feasible grasps" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_couplings_hold_among_all_feasible_grasps() -> None:
     """A coupling is what the hand is built like: climbing in F lets go of the other frozen motions only."""
     bundled = ga.load_problem("allegro_cylinder_3")

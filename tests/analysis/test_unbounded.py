@@ -166,6 +166,7 @@ def test_the_cans_volume_has_no_maximum(bare_can: ga.Result, tmp_path: Path) -> 
     np.testing.assert_array_equal(again.steps, found.steps)
 
 
+@pytest.mark.slow
 def test_the_command_line_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["optimize", "schunk_can", "--radius", "0.4", "--require", "none", "--refine", "--output", str(tmp_path)]
     assert main(words) == 0

@@ -141,6 +141,7 @@ def test_a_checkpoint_that_cannot_be_written_is_an_error(tmp_path: Path) -> None
         ga.optimize(ga.load_problem("planar_hand"), max_charts=100, checkpoint=tmp_path / "file")
 
 
+@pytest.mark.slow
 def test_no_vertex_of_a_complete_atlas_is_left() -> None:
     """A cut beside a closed vertex makes new vertices on charts that were done: they are expanded after all."""
     can = ga.load_problem("schunk_can")

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from helpers import BENT, chain, robot, tripod_problem
+from helpers import BENT, chain, robot, slow_but, tripod_problem
 
 import graspatlas as ga
 from graspatlas.cli import main
@@ -18,13 +18,16 @@ from graspatlas.commands.diagnosis import NOTE, OK, PROBLEM, Finding, diagnose, 
 from graspatlas.problems import problem_text
 from graspatlas.requirements.collision import CollisionChecker
 
+#: Bundled problems that are checked quickly.
+FEW = ("planar_hand", "schunk_can", "gripper_skittle", "allegro_sphere_3")
+
 
 def found(problem: ga.Problem, subject: str, **options) -> Finding:
     (one,) = [finding for finding in diagnose(problem, **options) if finding.subject == subject]
     return one
 
 
-@pytest.mark.parametrize("name", ga.bundled_problems())
+@pytest.mark.parametrize("name", slow_but(ga.bundled_problems(), *FEW))
 def test_bundled_problems_have_no_problem(name, capsys):
     assert main(["check", name]) == 0
     out = capsys.readouterr().out
@@ -248,6 +251,6 @@ def test_patches_that_lie_off_the_shapes_are_pointed_out():
         assert finding.text.count(":") == 1  # and nothing is said of the others
 
 
-@pytest.mark.parametrize("name", ga.bundled_problems())
+@pytest.mark.parametrize("name", slow_but(ga.bundled_problems(), *FEW))
 def test_the_bundled_patches_lie_on_the_shapes(name):
     assert found(ga.load_problem(name), "shapes at x1").mark == OK

@@ -45,7 +45,7 @@ def coupled(can: ga.Problem) -> ga.Problem:
 
 @pytest.fixture(scope="module")
 def coupled_result(coupled: ga.Problem) -> ga.Result:
-    return ga.optimize(coupled, dimension=2, radius=0.25, quality="smallest_semi_axis", refine="feasible")
+    return ga.optimize(coupled, dimension=2, radius=0.4, quality="smallest_semi_axis", refine="feasible")
 
 
 def broken(problem: ga.Problem, X: np.ndarray) -> float:

@@ -271,6 +271,7 @@ def test_some_random_postures_are_free_and_some_collide() -> None:
     assert 0.05 < np.mean(hits) < 0.95
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", ["schunk_sah", "objects"])
 def test_meshes_can_be_made_again(folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Running the script again gives the same files."""

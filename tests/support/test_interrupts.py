@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers import slow_but
 
 import graspatlas as ga
 from graspatlas.support import interrupts
@@ -109,7 +110,9 @@ def signalled(words: list[str], folder: Path, *signals: tuple[float, int]) -> su
     return subprocess.CompletedProcess(process.args, process.returncode, out.decode(), (seen + err).decode())
 
 
-@pytest.mark.parametrize("script", [OPTIMIZE, PYTHON_SYSTEM, INDEX], ids=["tracing", "Python system", "index"])
+@pytest.mark.parametrize(
+    "script", slow_but([OPTIMIZE, PYTHON_SYSTEM, INDEX], OPTIMIZE), ids=["tracing", "Python system", "index"]
+)
 def test_ctrl_c_twice_keeps_the_charts_in_a_program(tmp_path: Path, script: str) -> None:
     """The second comes a tenth of a second after the first."""
     done = signalled(["-c", script], tmp_path, *[(0.1, CTRL_C)] * 2)
@@ -150,9 +153,11 @@ def test_the_command_line_keeps_a_checkpoint_and_the_result(
 
 @pytest.fixture(autouse=True)
 def _own_handler() -> Iterator[None]:
-    """Python's own handler before and after, whatever runs the tests."""
+    """Python's own handlers before and after, whatever runs the tests, and whatever ran before."""
     before = signal.signal(CTRL_C, signal.default_int_handler)
+    terminate = signal.signal(TERMINATE, signal.SIG_DFL)
     yield
+    signal.signal(TERMINATE, terminate)
     assert signal.getsignal(CTRL_C) is signal.default_int_handler
     assert interrupts._watch is None
     signal.signal(CTRL_C, before)

@@ -58,6 +58,7 @@ def test_a_failing_problem_is_a_row(swept: Path) -> None:
     assert row["quality_best"] is None
 
 
+@pytest.mark.slow
 def test_finished_runs_are_skipped_and_new_ones_added(swept: Path) -> None:
     before = {row["run"]: row["seconds"] for row in pq.read_table(swept / ROWS).to_pylist()}
     sweep = run_sweep(["planar_hand"], swept, **options(radii=(*RADII, 0.2)))

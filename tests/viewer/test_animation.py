@@ -109,6 +109,7 @@ document.body.append(report);
 </script>"""
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 def test_slider_moves_the_grasp(path: ga.GraspPath, tmp_path: Path) -> None:
     page = tmp_path / "path.html"

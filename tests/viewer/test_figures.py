@@ -151,6 +151,7 @@ def test_extreme_semi_axes_make_the_inverse_condition_number(planar_result: ga.R
         assert shortest / longest == pytest.approx(grasp.quality)
 
 
+@pytest.mark.slow
 def test_portrait_shows_hand_and_object_on_white(can_result: ga.Result) -> None:
     picture = portrait(can_result.problem, can_result.best, width=160, height=160) / 255.0
     assert picture.shape == (160, 160, 3)

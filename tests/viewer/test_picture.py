@@ -106,12 +106,12 @@ def test_normals_are_in_the_picture(worst: bool) -> None:
         assert ((seen > low - 1e-6) & (seen < high + 1e-6)).all()
 
 
-def test_picture_has_the_size_asked_for(can_result: ga.Result, tmp_path: Path) -> None:
-    save_picture(can_result, tmp_path / "small.png", width=320, height=213)
+def test_picture_has_the_size_asked_for(planar_result: ga.Result, tmp_path: Path) -> None:
+    save_picture(planar_result, tmp_path / "small.png", width=320, height=213)
     assert pixels(tmp_path / "small.png").shape == (213, 320, 3)
     assert [path.name for path in tmp_path.iterdir()] == ["small.png"]
     with pytest.raises(ga.GraspAtlasError, match="at least 320"):
-        save_picture(can_result, tmp_path / "tiny.png", width=20, height=20)
+        save_picture(planar_result, tmp_path / "tiny.png", width=20, height=20)
 
 
 @pytest.mark.parametrize("write", [export_html, save_picture])

@@ -119,8 +119,12 @@ def replace_contacts(problem: ga.Problem, contacts: tuple[ga.Contact, ...]) -> S
 # Scene
 
 
-def test_scene_shows_every_mesh_of_hand_and_object(result: ga.Result) -> None:
-    scene = Scene(result)
+@pytest.fixture(scope="module")
+def scene(result: ga.Result) -> Scene:
+    return Scene(result)
+
+
+def test_scene_shows_every_mesh_of_hand_and_object(result: ga.Result, scene: Scene) -> None:
     assert [exhibit.name for exhibit in scene.exhibits] == ["best", "worst"]
     for exhibit in scene.exhibits:
         count = {group: sum(part.group == group for part in exhibit.parts) for group in ("hand", "object")}
@@ -131,8 +135,8 @@ def test_scene_shows_every_mesh_of_hand_and_object(result: ga.Result) -> None:
         assert sum(part.group == "ellipsoid" for part in exhibit.parts) == 1
 
 
-def test_contacts_lie_on_hand_and_object(result: ga.Result) -> None:
-    for exhibit in Scene(result).exhibits:
+def test_contacts_lie_on_hand_and_object(scene: Scene) -> None:
+    for exhibit in scene.exhibits:
         surface = {
             group: np.concatenate([dense(p.mesh.moved(p.T)) for p in exhibit.parts if p.group == group])
             for group in ("hand", "object")
