@@ -29,10 +29,12 @@ MOST_FILES = 12
 
 
 def modules() -> dict[str, Path]:
-    """All files of the package by the dotted names of their modules."""
+    """All files of the package by the dotted names of their modules; robots, which are installed in it, are data."""
     found = {}
     for path in sorted(PACKAGE.rglob("*.py")):
         parts = path.relative_to(PACKAGE).with_suffix("").parts
+        if parts[0] == "robots":
+            continue
         found[".".join((NAME, *(part for part in parts if part != "__init__")))] = path
     return found
 

@@ -31,6 +31,6 @@ def test_sizes_must_be_positive_numbers(make) -> None:
 def test_earlier_names_of_the_mechanism_still_work() -> None:
     mechanism = ga.load_problem("gripper_skittle").hand.mechanism
     with pytest.warns(DeprecationWarning, match="actuated"):
-        assert mechanism.actuated == mechanism.actuated
+        assert mechanism.driven == mechanism.actuated
     with pytest.warns(DeprecationWarning, match="transmission"):
         np.testing.assert_array_equal(mechanism.A, mechanism.transmission)
