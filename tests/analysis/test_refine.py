@@ -87,6 +87,7 @@ def test_more_freedom_is_never_worse(planar_result: ga.Result) -> None:
     assert both.refined_best.quality == free.qualities[0]
 
 
+@pytest.mark.slow
 def test_the_best_force_closure_in_f_is_that_of_equal_forces() -> None:
     """No margin exceeds that of contact forces that are all normal and equal, which three fingers can reach."""
     friction = 0.5

@@ -24,6 +24,7 @@ def assert_covered(atlas: ga.Atlas, x0: np.ndarray, count: int, seed: int, share
     assert len(set(charts.tolist())) >= spread * atlas.n_charts
 
 
+@pytest.mark.slow
 def test_the_can_is_covered(can_result):
     assert_covered(can_result.atlas, can_result.problem.x1_array, 10_000, 1, 0.97, 0.5)
 

@@ -65,6 +65,7 @@ def test_tags_are_read_and_chains_resolved():
     np.testing.assert_allclose(hand.mechanism.transmission[:, 0], [1.0, 1.0, -0.5, -1.0])
 
 
+@pytest.mark.slow
 def test_random_charts_of_an_atlas_keep_the_mimics(coupled, coupled_result):
     atlas = coupled_result.atlas
     assert atlas.complete

@@ -83,6 +83,7 @@ def general(hand: PlanarHand, problem: ga.Problem) -> ga.Atlas:
     return ga.build_atlas(system, problem.x1_array, radius=RADIUS, epsilon=EPSILON)
 
 
+@pytest.mark.slow
 def test_jacobian_of_the_second_route(hand: PlanarHand, paper: ga.Atlas) -> None:
     rng = np.random.default_rng(0)
     for chart in range(0, paper.n_charts, 40):

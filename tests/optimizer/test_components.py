@@ -94,6 +94,7 @@ def test_components_are_those_of_the_brute_force(counted, planar):
     assert sorted(homes) == [0, 1]
 
 
+@pytest.mark.slow
 def test_another_component_is_better(planar, planar_result):
     """Bundled x1 lies in the larger component, which does not hold the best grasp."""
     bundled = planar_result

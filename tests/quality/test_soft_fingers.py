@@ -14,6 +14,7 @@ from graspatlas.requirements import parse_requirement, requirement_from_dict
 FRICTION, TORSIONAL = 0.5, 0.005
 
 
+@pytest.mark.slow
 def test_two_hard_fingers_never_close_a_grasp(gripper):
     hard = quality.force_closure_margin(ga.Grasps(gripper.problem, gripper.atlas.centers, gripper.atlas.system))
     assert (hard == 0.0).all()

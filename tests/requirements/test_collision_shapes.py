@@ -192,6 +192,7 @@ def test_a_needle_is_thinned_by_distance_not_by_height():
     assert distance_by_coal(points, hull.points) <= 1e-4 + 1e-7
 
 
+@pytest.mark.slow
 def test_dents_are_told_from_solids_in_large_meshes_too():
     for rings, around in ((60, 100), (180, 200)):
         for dent, kind in ((0.0, "convex"), (0.2, "mesh")):
