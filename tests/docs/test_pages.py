@@ -24,7 +24,7 @@ PAGES = [page.name for page in sorted(DOCS.glob("*.md")) if page.name not in ELS
 def test_the_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     # Pages show what is counted where there is time for it, also on a machine that is busy with other tests.
-    monkeypatch.setattr("graspatlas.diagnosis.ESTIMATE_SECONDS", 20.0)
+    monkeypatch.setattr("graspatlas.commands.diagnosis.ESTIMATE_SECONDS", 20.0)
     if page == "patches.md":
         pytest.importorskip("trimesh")
     run = Run(page)
