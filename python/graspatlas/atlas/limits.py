@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterable
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import TypedDict
 
 from graspatlas.support.deadlines import deadline_after
 from graspatlas.support.machine import available_bytes, available_threads
-from graspatlas.support.validation import positive, whole
+from graspatlas.support.validation import check_keywords, positive, whole
 
-__all__ = ["LimitOptions", "Limits", "check_keywords"]
+__all__ = ["LimitOptions", "Limits"]
 
 #: Stands for no limit of charts.
 NO_LIMIT = 2**62
@@ -77,25 +74,6 @@ class Limits:
             memory=available_bytes() if memory is None else positive(memory, "max_bytes"),
             threads=_threads(threads),
         )
-
-    @property
-    def seconds_left(self) -> float:
-        """Time until the deadline [s]."""
-        return self.deadline - time.perf_counter()
-
-
-def check_keywords(given: Iterable[str], known: Iterable[str], function: str) -> None:
-    """Refuse keywords that a function does not have, as Python does.
-
-    Raises:
-        TypeError: If there is no such keyword; with the one that was meant, where that is clear.
-    """
-    known = list(known)
-    for keyword in given:
-        if keyword not in known:
-            close = get_close_matches(keyword, known, 1)
-            meant = f". Did you mean '{close[0]}'?" if close else ""
-            raise TypeError(f"{function}() got an unexpected keyword argument '{keyword}'{meant}")
 
 
 def _threads(threads: int | None) -> int:

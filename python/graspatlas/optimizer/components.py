@@ -17,7 +17,6 @@ import numpy as np
 from typing_extensions import Unpack
 
 from graspatlas.atlas.atlas import Atlas
-from graspatlas.atlas.limits import check_keywords
 from graspatlas.atlas.status import Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasp
@@ -28,16 +27,18 @@ from graspatlas.result.result import Result
 from graspatlas.result.summary import ResultSummary
 from graspatlas.search.grasp_search import MAX_SINGULAR, GraspSearch
 from graspatlas.support.arrays import Array
-from graspatlas.support.deadlines import deadline_after
+from graspatlas.support.deadlines import deadline_after, seconds_until
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.progress import progress_bar
-from graspatlas.support.validation import whole
+from graspatlas.support.validation import check_keywords, whole
 
 __all__ = ["Components", "SearchStatus", "find_components"]
 
 
 #: How far from the nearest polytope a covered grasp may lie, as a share of the radius: atlases have slivers.
 COVERED = 0.5
+#: Time that an atlas is given where none is left [s].
+SHORTEST = 1e-3
 #: Charts of an older atlas that are looked up in a new one to see whether it grew in the same component.
 SAMPLES = 50
 
@@ -272,8 +273,7 @@ class _Tracer:
 
     def trace(self, problem: Problem) -> int:
         """Trace the component of a problem's x1; its number."""
-        left = self.deadline - time.perf_counter()
-        seconds = None if np.isinf(left) else max(left, 1e-3)
+        seconds = seconds_until(self.deadline, SHORTEST)
         options: OptimizeOptions = {**self.options, "max_seconds": seconds}
         new = optimize(problem, **options, progress=self.progress)
         self.interrupted = new.status is Status.INTERRUPTED

@@ -6,7 +6,6 @@ Charts that neighbour each other make a graph; its shortest path is bridged on t
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from itertools import pairwise
 from numbers import Integral
@@ -26,7 +25,9 @@ from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.renamed import renamed_keyword
 from graspatlas.support.validation import number_array, positive
-from graspatlas.systems.geodesic import BOUND_TOLERANCE, Allowed, arc_lengths, bridge, evenly, shorten
+from graspatlas.systems.chain import Allowed
+from graspatlas.systems.geodesic import arc_lengths, bridge, evenly, shorten
+from graspatlas.systems.tangent_maps import BOUND_TOLERANCE
 
 __all__ = ["shortest_path"]
 
@@ -122,9 +123,8 @@ def shortest_path(
     if float(np.linalg.norm(atlas.system.difference(ends[0].x, ends[1].x))) <= SAME:
         X, tight = ends[0].x[None], True
     else:
-        shown = sys.stderr.isatty() if progress is None else progress
         X = _ChartGraph(atlas, open_charts, ends, longest / SPARE, allowed).shortest_chain()
-        X, tight = _shortened(atlas, X, longest, allowed, shown)
+        X, tight = _shortened(atlas, X, longest, allowed, progress)
     residuals = np.array([np.abs(atlas.system.evaluate_residual(x)).max(initial=0.0) for x in X])
     arguments = (atlas, X, arc_lengths(atlas.system, X), residuals, tight)
     return GraspPath(*arguments, result) if result else Path(*arguments)
@@ -139,7 +139,9 @@ def _step(atlas: Atlas, step: float | None) -> float:
     return given
 
 
-def _shortened(atlas: Atlas, X: Array, step: float, allowed: Allowed | None, shown: bool) -> tuple[Array, bool]:
+def _shortened(
+    atlas: Atlas, X: Array, step: float, allowed: Allowed | None, progress: bool | None
+) -> tuple[Array, bool]:
     """The chain X shortened, with even steps if all its points are then allowed, and whether no step shortens it."""
 
     def even(chain: Array, length: float) -> Array:
@@ -147,7 +149,7 @@ def _shortened(atlas: Atlas, X: Array, step: float, allowed: Allowed | None, sho
         return spread if spread is not None and (allowed is None or allowed(spread).all()) else chain
 
     X = even(X, step / SPARE)
-    X, tight = shorten(atlas.system, X, trust_radius=atlas.radius, longest=step, allowed=allowed, progress=shown)
+    X, tight = shorten(atlas.system, X, trust_radius=atlas.radius, longest=step, allowed=allowed, progress=progress)
     return even(X, step), tight
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from numbers import Integral, Real
 from typing import Any, TypeAlias, TypeVar
 
@@ -16,6 +17,7 @@ __all__ = [
     "Plain",
     "PlainTable",
     "StatedTable",
+    "check_keywords",
     "checked_instance",
     "checked_table",
     "number",
@@ -58,6 +60,20 @@ def shown(value: object) -> str:
     """A value for a message: text and numbers as they are, of large things the type."""
     text = repr(value)
     return text if len(text) <= 60 and "\n" not in text else f"a {type(value).__name__}"
+
+
+def check_keywords(given: Iterable[str], known: Iterable[str], function: str) -> None:
+    """Refuse keywords that a function does not have, as Python does.
+
+    Raises:
+        TypeError: If there is no such keyword; with the one that was meant, where that is clear.
+    """
+    known = list(known)
+    for keyword in given:
+        if keyword not in known:
+            close = get_close_matches(keyword, known, 1)
+            meant = f". Did you mean '{close[0]}'?" if close else ""
+            raise TypeError(f"{function}() got an unexpected keyword argument '{keyword}'{meant}")
 
 
 def checked_table(data: object, what: str, required: Sequence[str], optional: Sequence[str] | None = ()) -> StatedTable:
