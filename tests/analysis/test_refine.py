@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -155,6 +157,24 @@ def test_wrong_input_is_refused(can: ga.Result, planar_result: ga.Result) -> Non
     assert nothing.refinement is None
     with pytest.raises(ga.GraspAtlasError, match="no grasp meets the requirements"):
         ga.refine(nothing)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda given: ga.climb(given, 0),
+        lambda given: ga.local_maxima(given),
+        lambda given: ga.refine(given),
+        lambda given: ga.densify(given, 0.1),
+        lambda given: ga.pareto_front(given, "smallest_semi_axis", "manipulability_volume"),
+    ],
+    ids=["climb", "local_maxima", "refine", "densify", "pareto_front"],
+)
+def test_what_is_not_a_result_is_named(call: Callable[[Any], Any]) -> None:
+    with pytest.raises(
+        ga.GraspAtlasError, match=r"result must be a graspatlas\.Result, got .*see graspatlas\.optimize"
+    ):
+        call(ga.load_problem("planar_hand"))
 
 
 def test_functions_that_files_do_not_keep_cannot_be_refined(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ def batch_of(result: ga.Result, charts: list[int]) -> Grasps:
 
 
 NO_NUMBERS = {
-    "None": (None, "None; a return statement may be missing"),
+    "None": (None, "a return statement may be missing"),
     "text": ("1.5", "'1.5'"),
     "bytes": (b"1", "b'1'"),
     "complex": (1.0 + 2.0j, "complex"),

@@ -21,10 +21,10 @@ from graspatlas.analysis.local_model import LocalModel, Objective
 from graspatlas.analysis.unbounded import followed, is_sharp, levels_around, never_levels_off, rises_towards_one_point
 from graspatlas.errors import GraspAtlasError
 from graspatlas.quality.evaluation import evaluate
-from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.result.grasp_atlas import GraspAtlas, check_is_result
 from graspatlas.support.arrays import Array
 from graspatlas.support.deadlines import deadline_after
-from graspatlas.support.validation import checked_instance, number_array, shown, whole
+from graspatlas.support.validation import number_array, shown, whole
 
 __all__ = ["MAX_STEPS", "Climb", "climb"]
 
@@ -106,7 +106,7 @@ def climb(
         GraspAtlasError: If there is no such chart, the start is no feasible grasp or does not meet the requirements, or
             the index fails.
     """
-    checked_instance(result, GraspAtlas, "result", "graspatlas.optimize")
+    check_is_result(result)
     whole(max_steps, "max_steps")
     deadline = deadline_after(max_seconds)
     objective = Objective.of(result, all_motions)

@@ -24,7 +24,7 @@ from graspatlas.grasps.grasps import Grasp, Grasps
 from graspatlas.problem.problem import Problem
 from graspatlas.quality.evaluation import evaluate
 from graspatlas.requirements.screening import screen
-from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.result.grasp_atlas import GraspAtlas, check_is_result
 from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.renamed import renamed_attribute
@@ -95,6 +95,7 @@ def densify(result: GraspAtlas, spacing: float, *, share: float = 1.0, progress:
 
     Source: "Global Optimization of Robotic Grasps", end of Section IV.
     """
+    check_is_result(result)
     positive(share, "share", most=1.0)
     count = int(np.ceil(share * result.atlas.n_charts))
     charts = np.sort(np.argsort(-jumps(result), kind="stable")[:count])

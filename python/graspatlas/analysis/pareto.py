@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.quality.batched import Quality, quality_name
-from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.result.grasp_atlas import GraspAtlas, check_is_result
 from graspatlas.support.arrays import Array, IntArray
 
 __all__ = ["knee", "pareto_front", "values_of"]
@@ -39,6 +39,7 @@ def pareto_front(result: GraspAtlas, *indices: Quality) -> IntArray:
         GraspAtlasError: If fewer than two different indices are given, one is unknown or fails, or no grasp meets the
             requirements.
     """
+    check_is_result(result)
     values = values_of(result, *indices)
     charts = np.flatnonzero(result.accepted)
     if len(charts) == 0:

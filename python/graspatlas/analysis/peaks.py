@@ -10,9 +10,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from graspatlas.analysis.climb import Climb
-from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.result.grasp_atlas import GraspAtlas, check_is_result
 from graspatlas.support.arrays import Array, IntArray
-from graspatlas.support.validation import checked_instance
 
 __all__ = ["Peak", "local_maxima", "peaks_of"]
 
@@ -32,7 +31,7 @@ def local_maxima(result: GraspAtlas) -> IntArray:
     Returns:
         Charts [p], by decreasing quality.
     """
-    checked_instance(result, GraspAtlas, "result", "graspatlas.optimize")
+    check_is_result(result)
     atlas, q = result.atlas, np.where(result.accepted, result.qualities, -np.inf)
     i, j = atlas.neighbour_pairs.T
     equal = q[i] == q[j]

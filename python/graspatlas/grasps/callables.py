@@ -105,7 +105,9 @@ def _checked(returned: object, shape: tuple[int, ...], rule: str, kinds: str, pl
     except Exception:  # objects convert themselves as they like
         raise GraspAtlasError(f"{rule}; it returned {_shown(returned)}{place}") from None
     hint = ""
-    if array.dtype.kind == "c":
+    if returned is None:
+        hint = "; a return statement may be missing"
+    elif array.dtype.kind == "c":
         hint = ", which is complex: take its real part or its absolute value"
     elif masked:
         hint = ", which is masked: fill it"
@@ -130,7 +132,7 @@ def _has_masked(returned: object) -> bool:
 def _shown(value: object) -> str:
     """A value for a message, in one short line; of large things the type."""
     if value is None:
-        return "None; a return statement may be missing"
+        return "None"
     try:
         text = reprlib.repr(value)
     except Exception:

@@ -119,7 +119,9 @@ def read_result(path: str | os.PathLike[str]) -> Parts:
         raise GraspAtlasError(f"'{source}' is damaged or not a graspatlas result{reason}; compute it again") from None
     if header.get("version") != FORMAT_VERSION:
         version = shown(header.get("version"))
-        raise GraspAtlasError(f"result '{source}' has version {version}, this graspatlas reads {FORMAT_VERSION}")
+        raise GraspAtlasError(
+            f"result '{source}' has version {version}, this graspatlas reads {FORMAT_VERSION}: compute it again"
+        )
     return _parts(header, arrays, source)
 
 

@@ -24,9 +24,9 @@ from graspatlas.result.refinement import Refinement
 from graspatlas.support.arrays import Array, BoolArray, IndexArray
 from graspatlas.support.pickling import Light
 from graspatlas.support.renamed import renamed_attribute
-from graspatlas.support.validation import read_only
+from graspatlas.support.validation import read_only, shown
 
-__all__ = ["GraspAtlas", "grasp_system"]
+__all__ = ["GraspAtlas", "check_is_result", "grasp_system"]
 
 
 def grasp_system(atlas: Atlas) -> _core.GraspSystem:
@@ -39,6 +39,16 @@ def grasp_system(atlas: Atlas) -> _core.GraspSystem:
     if not isinstance(system, _core.GraspSystem):
         raise GraspAtlasError(f"the atlas must be one of grasps, got one of a {type(system).__name__}")
     return system
+
+
+def check_is_result(value: object) -> None:
+    """Make sure that a value is a result.
+
+    Raises:
+        GraspAtlasError: If it is anything else.
+    """
+    if not isinstance(value, GraspAtlas):
+        raise GraspAtlasError(f"result must be a graspatlas.Result, got {shown(value)}; see graspatlas.optimize")
 
 
 @dataclass(frozen=True, eq=False)
