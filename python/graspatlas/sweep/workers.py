@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["rows_as_they_come"]
 
+#: Time in which a scheduler must answer [s].
+ANSWER_SECONDS = 20.0
 #: Whether PYTHONSAFEPATH keeps the current folder off the path of modules; older ones than 3.11 do not know it.
 KNOWS_SAFE_PATH = sys.version_info >= (3, 11)
 
@@ -89,7 +91,7 @@ def _solved(sound: Sequence[Run], scheduler: str | None, workers: int | None) ->
     count = min(workers or available_threads(), len(sound))
     cluster = _local_cluster(count) if scheduler is None else None
     try:
-        client = dask.Client(scheduler if cluster is None else cluster, timeout="20s")
+        client = dask.Client(scheduler if cluster is None else cluster, timeout=ANSWER_SECONDS)
     except (OSError, ValueError) as error:
         raise GraspAtlasError(
             f"no Dask scheduler answers at '{scheduler}' ({error}); start one with: dask scheduler"
