@@ -36,7 +36,7 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     ga.save_picture(result, folder / "best.png", width=640, height=480, worst=False)
     ga.export_html(result, folder / "grasps.html")
-    print(f"written to {folder}: best.png, and grasps.html to turn about in a browser")
+    print(f"written to {folder}: best.png, and grasps.html to rotate in a browser")
 
 
 def print_freedoms(problem: ga.Problem) -> None:

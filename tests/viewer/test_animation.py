@@ -125,6 +125,26 @@ def test_slider_moves_the_grasp(path: ga.GraspPath, tmp_path: Path) -> None:
     assert f"arc length {path.arc_length[film.points[17]]:.3f} of {path.length:.3f}" in text
 
 
+#: Says how far the page reaches beyond the window while its longest line is shown.
+LONGEST_LINE = """<script>
+addEventListener("load", () => setTimeout(() => {
+  const line = "inverse condition number 0.0363 \\u2717 breaks a requirement";
+  document.getElementById("readout").firstChild.textContent = line;
+  const page = document.documentElement;
+  document.title = "beyond " + (page.scrollWidth - page.clientWidth) + ", " + (page.scrollHeight - page.clientHeight);
+}, 500));
+</script>"""
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_the_longest_line_of_a_film_page_stays_in_the_window(path: ga.GraspPath, tmp_path: Path) -> None:
+    page = tmp_path / "path.html"
+    export_html(path, page)
+    page.write_text(page.read_text(encoding="utf-8").replace("</body>", LONGEST_LINE + "</body>"), encoding="utf-8")
+    assert "<title>beyond 0, 0</title>" in browse(page.as_uri(), tmp_path, "--dump-dom")
+
+
 @pytest.mark.slow
 @pytest.mark.browser
 def test_film_page_opens_at_the_frame_of_its_address(path: ga.GraspPath, tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ def view(
 
 
 def export_html(shown: Result | Path, path: str | os.PathLike[str]) -> None:
-    """Write the best and the worst grasp of a result as one page to turn about in a browser; or a path, with a slider.
+    """Write the best and the worst grasp of a result as one page to rotate in a browser; or a path, with a slider.
 
     The page opens from the disk; it needs neither a server nor the network. That of a path opens at the frame that its
     address names, such as ``path.html#frame=30``.
