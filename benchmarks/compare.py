@@ -145,7 +145,8 @@ def against_multistart() -> Iterator[str]:
         "SciPy's SLSQP on the same equations and bounds, with their exact derivatives, from random starts in the box "
         "that the feasible grasps fill; until one start comes within 0.1 % of the atlas's best grasp (k = 2, "
         f"r = 0.17), or {GIVE_UP:.0f} s have passed. The atlas's time includes the index at every chart. Its "
-        "best is the best of its charts, without requirements, which SLSQP does not have either; `climb` goes on from there, as each start of SLSQP does."
+        "best is the best of its charts, without requirements, which SLSQP does not have either; `climb` goes on from "
+        "there, as each start of SLSQP does."
     )
     yield ""
     rows = []
@@ -205,9 +206,7 @@ def growth() -> Iterator[str]:
     yield from growth_table("The can, k = 2, radius halved four times", by_radius("schunk_can", 2, 0.34))
     yield from growth_table("The oil bottle, k = 3, radius halved four times", by_radius("schunk_oil_bottle", 3, 0.8))
     yield from growth_table("Unit spheres of 1 to 4 dimensions, r = 0.3, epsilon = 0.3", by_dimension(0.3))
-    threads = by_threads("schunk_can", 2, 0.0425)
-    if threads:
-        yield from growth_table("The can, k = 2, r = 0.0425, threads", threads)
+    yield from growth_table("The can, k = 2, r = 0.0425, threads", by_threads("schunk_can", 2, 0.0425))
 
 
 def machine() -> Iterator[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import multiprocessing
 import os
 import resource
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 import graspatlas as ga
+from graspatlas.support.machine import available_threads
 
 PAGE = os.sysconf("SC_PAGE_SIZE")
 
@@ -83,9 +83,6 @@ def by_dimension(radius: float) -> list[Row]:
 
 
 def by_threads(name: str, dimension: int, radius: float) -> list[Row]:
-    """The same atlas with more and more threads; nothing while `build_atlas` has no such argument."""
-    if "threads" not in inspect.signature(ga.build_atlas).parameters:
-        return []
-    available = len(os.sched_getaffinity(0))
-    counts = [n for n in (1, 2, 4, 8, 16) if n <= available]
+    """The same atlas with more and more threads."""
+    counts = [n for n in (1, 2, 4, 8, 16) if n <= available_threads()]
     return [measured(f"{n} threads", problem_atlas(name, dimension, radius, threads=n)) for n in counts]
