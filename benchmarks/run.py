@@ -16,7 +16,7 @@ import numpy as np
 
 import graspatlas as ga
 from graspatlas import _core
-from graspatlas.requirements.collision import CollisionChecker
+from graspatlas.collision.checker import CollisionChecker
 
 REPEATS = 7
 

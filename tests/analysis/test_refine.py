@@ -13,7 +13,7 @@ import pytest
 
 import graspatlas as ga
 from graspatlas.cli import main
-from graspatlas.requirements.collision import CollisionChecker
+from graspatlas.collision.checker import CollisionChecker
 
 HOLDS = (ga.ForceClosure(0.5, 0.02), ga.CollisionFree())
 #: Largest difference of refined bests that started from atlases of two radii.

@@ -13,10 +13,10 @@ from helpers import BENT, chain, robot, slow_but, tripod_problem
 
 import graspatlas as ga
 from graspatlas.cli import main
+from graspatlas.collision.checker import CollisionChecker
 from graspatlas.commands import diagnosis
 from graspatlas.commands.diagnosis import NOTE, OK, PROBLEM, Finding, diagnose, redundant_joints, report
 from graspatlas.problems import problem_text
-from graspatlas.requirements.collision import CollisionChecker
 
 #: Bundled problems that are checked quickly.
 FEW = ("planar_hand", "schunk_can", "gripper_skittle", "allegro_sphere_3")

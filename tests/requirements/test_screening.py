@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from oracles.wrench_lp import margin_by_linear_programming
 
 import graspatlas as ga
+from graspatlas.collision.checker import CollisionChecker
 from graspatlas.problem import requirement
 from graspatlas.requirements import parse_requirement, requirement_name
 from graspatlas.requirements.base import asked
-from graspatlas.requirements.collision import CollisionChecker
 
 Array = NDArray[np.float64]
 

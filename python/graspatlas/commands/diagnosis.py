@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from graspatlas.atlas.build import build_atlas
 from graspatlas.atlas.status import Status
+from graspatlas.collision.checker import CollisionChecker
+from graspatlas.collision.hulls import LARGEST_ERROR
 from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.problem import Problem
-from graspatlas.requirements.collision import CollisionChecker
-from graspatlas.requirements.hulls import LARGEST_ERROR
 from graspatlas.search.grasp_search import with_first_grasp
 from graspatlas.support.arrays import Array
 

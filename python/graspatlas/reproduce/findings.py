@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from graspatlas.collision.checker import CollisionChecker
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.optimizer.components import find_components
 from graspatlas.reproduce.box_starts import REACHED, multistart
@@ -13,7 +14,6 @@ from graspatlas.reproduce.climbing import SEED
 from graspatlas.reproduce.published import RELEASED_RATIO
 from graspatlas.reproduce.report import Claim, Number, Section
 from graspatlas.reproduce.runs import Setting
-from graspatlas.requirements.collision import CollisionChecker
 from graspatlas.requirements.collision_free import CollisionFree
 from graspatlas.requirements.force_closure import ForceClosure
 from graspatlas.requirements.screening import screen

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
 
+from graspatlas.collision.checker import CollisionChecker, collision_checker
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.problem.problem import Problem
 from graspatlas.requirements.base import Requirement, Slacks
-from graspatlas.requirements.collision import CollisionChecker
 from graspatlas.support.arrays import BoolArray
 
 __all__ = ["CollisionFree"]
@@ -50,10 +49,4 @@ class CollisionFree(Requirement):
         return lambda grasps: (checker.clearances(grasps.x, pairs) - CLOSEST) / grasps.problem.length_scale
 
     def _checker(self, problem: Problem) -> CollisionChecker:
-        return _checker(problem, self.touch_depth, self.clearance)
-
-
-@lru_cache(maxsize=4)
-def _checker(problem: Problem, touch_depth: float, clearance: float) -> CollisionChecker:
-    """Checkers of the last problems: reading the shapes takes longer than to check a thousand grasps."""
-    return CollisionChecker(problem, touch_depth, clearance)
+        return collision_checker(problem, self.touch_depth, self.clearance)

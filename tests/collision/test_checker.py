@@ -14,7 +14,7 @@ from helpers import slow_but
 from oracles.collision_oracle import CLEARANCE, DEPTH, DOUBT, Oracle, made_grasps, made_problem
 
 import graspatlas as ga
-from graspatlas.requirements.collision import CollisionChecker
+from graspatlas.collision.checker import CollisionChecker
 
 HANDS = {1: "s", 5: "scbms", 17: "scbmh" * 4, 32: "scbm" * 8, 70: "scbbm" * 14}
 #: Shapes of the hand, of the object, and of the fingertip.
@@ -114,7 +114,7 @@ import sys
 from pathlib import Path
 sys.path.insert(0, {tests!r})
 from oracles.collision_oracle import made_problem, touching_grasps
-from graspatlas.requirements.collision import CollisionChecker
+from graspatlas.collision.checker import CollisionChecker
 made = made_problem(Path({folder!r}), "scbm" * 8, "c", "h")
 X, answers = touching_grasps(made, 300), set()
 for _ in range(100):

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from graspatlas import _core
+from graspatlas.collision.problem_shapes import collision_shapes
+from graspatlas.collision.shapes import Shape, convex_hull, thinner
 from graspatlas.errors import GraspAtlasError
-from graspatlas.hand.mesh_files import check_meshes
-from graspatlas.requirements.collision_shapes import Shape, convex_hull, convex_solid, read_shapes, thinner
 from graspatlas.support.arrays import Array, BoolArray, Int32Array
 from graspatlas.support.progress import progress_bar
 
 if TYPE_CHECKING:
-    from graspatlas.hand.body import Body
     from graspatlas.problem.problem import Problem
 
-__all__ = ["CollisionChecker", "Nearest"]
+__all__ = ["CollisionChecker", "Nearest", "collision_checker"]
 
 #: Before the names of the object's shapes.
 OBJECT = "object/"
@@ -171,6 +169,15 @@ class CollisionChecker:
         return np.arange(len(self.pairs), dtype=np.int32) if pairs is None else np.asarray(pairs, np.int32)
 
 
+@lru_cache(maxsize=8)
+def collision_checker(problem: Problem, touch_depth: float = 0.002, clearance: float = 0.0) -> CollisionChecker:
+    """The checker of a problem, of the last ones kept: reading the shapes takes longer than to check many grasps.
+
+    Args and errors are those of :class:`CollisionChecker`.
+    """
+    return CollisionChecker(problem, touch_depth, clearance)
+
+
 @dataclass(frozen=True)
 class _Pair:
     """Numbers of two shapes, and the distance that they must keep [m]."""
@@ -184,11 +191,12 @@ def _joined(
     problem: Problem, object_joint: int, touch_depth: float, clearance: float
 ) -> tuple[list[Shape], list[_Pair]]:
     """Shapes of hand and object, and the pairs to look at: those in the hand, then those with the object."""
-    shapes = _shapes(problem.hand, problem.hand.tree)
+    stated = collision_shapes(problem)
+    shapes = list(stated.hand)
     in_hand = list(enumerate(shapes))
-    pairs = [_Pair(a, b, clearance) for a, b in _hand_pairs(shapes, problem.hand)]
+    pairs = [_Pair(a, b, clearance) for a, b in stated.hand_pairs]
     touching = {problem.hand.frame(contact.frame)[0] for contact in problem.contacts}
-    for shape in _shapes(problem.object, problem.object.urdf):
+    for shape in stated.object:
         second = len(shapes)
         shapes.append(replace(shape, name=OBJECT + shape.name, joint=object_joint))
         for first, of_link in in_hand:
@@ -217,39 +225,3 @@ def _may_touch(shape: Shape, surface: bool, touch_depth: float) -> Shape | None:
 
 def _in_object(shape: Shape) -> bool:
     return shape.name.startswith(OBJECT)
-
-
-def _shapes(body: Body, tree: str) -> list[Shape]:
-    """Collision shapes of a body, convex meshes as solids."""
-    check_meshes(body)
-    try:
-        shapes = read_shapes(tree, body.urdf, body.package_dirs)
-    except GraspAtlasError as error:
-        reason = " ".join(str(error).split())
-        raise GraspAtlasError(f"collision shapes of '{body.name}' cannot be read: {reason}") from None
-    if not shapes:
-        raise GraspAtlasError(f"'{body.name}' has no collision shape; give its URDF <collision> elements")
-    return [convex_solid(shape) for shape in shapes]
-
-
-def _hand_pairs(shapes: list[Shape], hand: Body) -> Iterator[tuple[int, int]]:
-    """Pairs of the hand's shapes that must not touch; without an SRDF those of neighbouring joints may."""
-    may_touch = _disabled(hand)
-    for i, a in enumerate(shapes):
-        for j, b in enumerate(shapes[i + 1 :], i + 1):
-            neighbours = not hand.srdf and (a.parent_joint == b.joint or b.parent_joint == a.joint)
-            if a.joint != b.joint and not neighbours and frozenset((a.link, b.link)) not in may_touch:
-                yield i, j
-
-
-def _disabled(hand: Body) -> set[frozenset[str]]:
-    """Pairs of links that the hand's SRDF lists."""
-    if not hand.srdf:
-        return set()
-    try:
-        elements = ElementTree.fromstring(hand.srdf).iter("disable_collisions")
-        return {frozenset((element.attrib["link1"], element.attrib["link2"])) for element in elements}
-    except ElementTree.ParseError as error:
-        raise GraspAtlasError(f"the SRDF of '{hand.name}' is not XML: {error}") from None
-    except KeyError as error:
-        raise GraspAtlasError(f"a disable_collisions element in the SRDF of '{hand.name}' has no {error}") from None

@@ -4,7 +4,7 @@ Most meshes of fingertips and objects are convex, or nearly: a mesh that bounds 
 that does not, such as a bowl, stays a mesh; whatever may sink into it by a depth is made thinner by that depth instead.
 For balls that is the same. Sharp corners may sink in deeper: a layer off two faces takes more off their edge.
 
-Hulls with many corners are thinned to some of these corners, see :mod:`graspatlas.requirements.hulls`.
+Hulls with many corners are thinned to some of these corners, see :mod:`graspatlas.collision.hulls`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from graspatlas import _core
-from graspatlas.requirements.hulls import MANY_POINTS, corners_of_hull, mesh_volume, shallow_volume
+from graspatlas.collision.hulls import MANY_POINTS, corners_of_hull, mesh_volume, shallow_volume
 from graspatlas.support.arrays import Array, Int32Array
 
 __all__ = ["Shape", "convex_hull", "convex_solid", "read_shapes", "thinner"]

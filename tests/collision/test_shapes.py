@@ -12,10 +12,10 @@ from oracles.collision_oracle import write_box
 from scipy.spatial import ConvexHull
 
 import graspatlas as ga
+from graspatlas.collision.checker import CollisionChecker
+from graspatlas.collision.shapes import Shape, convex_hull, convex_solid, read_shapes, thinner
 from graspatlas.commands.diagnosis import OK, PROBLEM, diagnose
 from graspatlas.hand.urdf import box_urdf, mesh_urdf
-from graspatlas.requirements.collision import CollisionChecker
-from graspatlas.requirements.collision_shapes import Shape, convex_hull, convex_solid, read_shapes, thinner
 
 BOX = np.array([0.05, 0.05, 0.14])
 

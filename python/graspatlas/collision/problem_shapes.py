@@ -1,0 +1,91 @@
+"""The collision shapes of a problem, and which of them may touch: what a simulator builds the same scene from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+from graspatlas.collision.shapes import Shape, convex_solid, read_shapes
+from graspatlas.errors import GraspAtlasError
+from graspatlas.hand.mesh_files import check_meshes
+
+if TYPE_CHECKING:
+    from graspatlas.hand.body import Body
+    from graspatlas.hand.hand import Hand
+    from graspatlas.problem.problem import Problem
+
+__all__ = ["CollisionShapes", "collision_shapes"]
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionShapes:
+    """The collision shapes of a hand and an object, meshes that bound a convex solid as that solid.
+
+    Attributes:
+        hand: Shapes of the hand, each placed in the frame of the joint that carries it; 0 is the palm.
+        object: Shapes of the object, placed in its own frame.
+        ignored: Pairs of numbers of ``hand``, the smaller first, that may touch: shapes of one joint, links that the
+            SRDF lists, and without an SRDF those of neighbouring joints.
+    """
+
+    hand: tuple[Shape, ...]
+    object: tuple[Shape, ...]
+    ignored: frozenset[tuple[int, int]]
+
+    @property
+    def hand_pairs(self) -> tuple[tuple[int, int], ...]:
+        """Pairs of numbers of ``hand``, the smaller first and in order, that must not touch."""
+        return tuple(pair for pair in combinations(range(len(self.hand)), 2) if pair not in self.ignored)
+
+
+def collision_shapes(problem: Problem) -> CollisionShapes:
+    """The collision shapes of a problem, those that :class:`graspatlas.CollisionFree` looks at.
+
+    What links with a contact sink into the object by, and the thinner stand-ins that this takes, is left to
+    :class:`graspatlas.collision.checker.CollisionChecker`.
+
+    Raises:
+        GraspAtlasError: If hand or object has no collision shape, or a mesh or the SRDF cannot be read.
+    """
+    hand = _shapes(problem.hand, problem.hand.tree)
+    return CollisionShapes(hand, _shapes(problem.object, problem.object.urdf), _ignored(hand, problem.hand))
+
+
+def _shapes(body: Body, tree: str) -> tuple[Shape, ...]:
+    """Collision shapes of a body, convex meshes as solids."""
+    check_meshes(body)
+    try:
+        shapes = read_shapes(tree, body.urdf, body.package_dirs)
+    except GraspAtlasError as error:
+        reason = " ".join(str(error).split())
+        raise GraspAtlasError(f"collision shapes of '{body.name}' cannot be read: {reason}") from None
+    if not shapes:
+        raise GraspAtlasError(f"'{body.name}' has no collision shape; give its URDF <collision> elements")
+    return tuple(map(convex_solid, shapes))
+
+
+def _ignored(shapes: tuple[Shape, ...], hand: Hand) -> frozenset[tuple[int, int]]:
+    """Pairs of the hand's shapes that may touch; without an SRDF those of neighbouring joints may."""
+    listed = _disabled(hand)
+    return frozenset(
+        (i, j)
+        for (i, a), (j, b) in combinations(enumerate(shapes), 2)
+        if a.joint == b.joint
+        or (not hand.srdf and (a.parent_joint == b.joint or b.parent_joint == a.joint))
+        or frozenset((a.link, b.link)) in listed
+    )
+
+
+def _disabled(hand: Hand) -> set[frozenset[str]]:
+    """Pairs of links that the hand's SRDF lists."""
+    if not hand.srdf:
+        return set()
+    try:
+        elements = ElementTree.fromstring(hand.srdf).iter("disable_collisions")
+        return {frozenset((element.attrib["link1"], element.attrib["link2"])) for element in elements}
+    except ElementTree.ParseError as error:
+        raise GraspAtlasError(f"the SRDF of '{hand.name}' is not XML: {error}") from None
+    except KeyError as error:
+        raise GraspAtlasError(f"a disable_collisions element in the SRDF of '{hand.name}' has no {error}") from None
