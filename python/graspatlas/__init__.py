@@ -15,6 +15,8 @@ from graspatlas.atlas.atlas import Atlas
 from graspatlas.atlas.build import build_atlas
 from graspatlas.atlas.status import Closed, Status
 from graspatlas.errors import GraspAtlasError
+from graspatlas.execution.approach import Approach
+from graspatlas.execution.pregrasp import Pregrasp
 from graspatlas.grasps.grasps import Grasp, Grasps
 from graspatlas.hand import motions
 from graspatlas.hand.body import Body
@@ -55,6 +57,7 @@ if typing.TYPE_CHECKING:
     )
 
 __all__ = [
+    "Approach",
     "Atlas",
     "Body",
     "Climb",
@@ -74,6 +77,7 @@ __all__ = [
     "Path",
     "Peak",
     "PoseGuess",
+    "Pregrasp",
     "Problem",
     "Refinement",
     "Result",

@@ -44,6 +44,12 @@ def add_result_commands(commands: Subcommands) -> None:
         "--accepted", "--feasible", action="store_true", help="only grasps that meet the result's requirements"
     )
     out.add_argument("--refined", action="store_true", help="put the refined best before the others")
+    out.add_argument(
+        "--pregrasp",
+        type=float,
+        metavar="M",
+        help="add the hand's posture before each grasp, all contact points this far off the object [m], such as 0.01",
+    )
     out.add_argument("--table", type=path_word, metavar="FILE", help="write the table of charts (.csv or .parquet)")
     out.add_argument("--json", action="store_true", help="print one JSON object on standard output")
     out.set_defaults(run=_export)
@@ -71,6 +77,8 @@ def _view(options: argparse.Namespace) -> int:
 def _export(options: argparse.Namespace) -> int:
     if not options.grasps and not options.table:
         raise GraspAtlasError("nothing to write: give --grasps FILE or --table FILE")
+    if options.pregrasp is not None and not options.grasps:
+        raise GraspAtlasError("--pregrasp adds postures to a file of grasps: give --grasps FILE too")
     if options.table and options.table.suffix not in FRAME_ENDINGS:
         raise GraspAtlasError(f"table '{options.table}' must end in {' or '.join(FRAME_ENDINGS)}")
     result = load_result(options.result)
@@ -80,7 +88,7 @@ def _export(options: argparse.Namespace) -> int:
     summary: PlainTable = {"problem": result.problem.name, "n_charts": result.atlas.n_charts}
     if options.grasps:
         charts = options.chart and [chart_named(result, name) for name in options.chart]
-        chosen = {name: getattr(options, name) for name in ("best", "accepted", "refined")}
+        chosen = {name: getattr(options, name) for name in ("best", "accepted", "refined", "pregrasp")}
         count = result.save_grasps(options.grasps, charts=charts, **chosen)
         summary |= {"n_grasps": count, "grasps": str(options.grasps)}
     if options.table:

@@ -16,6 +16,8 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from graspatlas import _core
+from graspatlas.execution.approach import Approach, approach
+from graspatlas.execution.pregrasp import DISTANCE, Pregrasp, pregrasps
 from graspatlas.support.arrays import Array
 from graspatlas.support.pickling import Light
 from graspatlas.support.validation import number_array, read_only
@@ -133,6 +135,63 @@ class Grasp:
             GraspAtlasError: If the hand has no such frame.
         """
         return {name: T[0] for name, T in Grasps(self.problem, self.x).poses(frames).items()}
+
+    def pregrasp(self, distance: float = DISTANCE, *, touch_depth: float = 0.002, clearance: float = 0.0) -> Pregrasp:
+        """The posture of the hand before this grasp: each contact point off the object by the same distance.
+
+        The object is where the grasp holds it, and the contact points of the hand, which stay where they are in their
+        links, are off it along its outward normals at the contacts. Only joints that move them leave the grasp's
+        posture. The hand walks outwards in steps of a millimetre, each a least-squares problem bounded by the joint
+        limits; joints that mimic others follow them. On the way the fingertips may be as deep in the object as
+        :class:`graspatlas.CollisionFree` allows; at the end nothing touches, neither object nor hand.
+
+        A distance that cannot be reached is no error: the result says how far the hand gets, and why.
+
+        Args:
+            distance: How far the contact points are off the object [m].
+            touch_depth: Depth to which a touching link may sink into the object on the way [m].
+            clearance: Distance that all other pairs of shapes must keep [m].
+
+        Raises:
+            GraspAtlasError: If a number makes no sense, or hand or object has no collision shape.
+        """
+        found = pregrasps(self.problem, self.x[None], distance, touch_depth=touch_depth, clearance=clearance)
+        return found[0]
+
+    def approach(
+        self,
+        distance: float = DISTANCE,
+        seconds: float = 0.4,
+        *,
+        time_step: float = 0.01,
+        squeeze: Mapping[str, float] | Sequence[float] | Array | None = None,
+        squeeze_seconds: float = 0.4,
+        touch_depth: float = 0.002,
+        clearance: float = 0.0,
+    ) -> Approach:
+        """The way into this grasp: a timed trajectory of the joints from :meth:`pregrasp` to the grasp, and a squeeze.
+
+        At each time all contact points are equally far off the object, so that they arrive together. Either part starts
+        and stops with least jerk. It takes longer than asked for where a joint would exceed the velocity limit of the
+        hand's URDF, and says so.
+
+        Args:
+            distance: How far the contact points are off the object at the beginning [m].
+            seconds: Time from there to the grasp [s].
+            time_step: Time between two points, at most [s].
+            squeeze: Joint positions to go on to after the grasp, by name or those of all joints [h], radians and
+                metres: what a position controller is to be told so that it presses. Joints that are not named stay;
+                limits and collisions are not looked at.
+            squeeze_seconds: Time from the grasp to the squeeze [s].
+            touch_depth: See :meth:`pregrasp`.
+            clearance: See :meth:`pregrasp`.
+
+        Raises:
+            GraspAtlasError: If a number makes no sense, the squeeze names a joint that there is not, or hand or object
+                has no collision shape.
+        """
+        start = self.pregrasp(distance, touch_depth=touch_depth, clearance=clearance)
+        return approach(start, seconds, time_step=time_step, squeeze=squeeze, squeeze_seconds=squeeze_seconds)
 
     def __str__(self) -> str:
         angles = ", ".join(f"{name} {value:.3f}" for name, value in self.joint_positions.items())
@@ -281,6 +340,28 @@ class Grasps(Light):
     def semi_axes(self) -> Array:
         """Ascending semi-axes of the manipulability ellipsoid [n, 6], lengths in millimetres."""
         return read_only(np.asarray(_core.semi_axes(self.system, self.x, self.LENGTH_UNIT)))
+
+    def pregrasps(
+        self,
+        distance: float = DISTANCE,
+        *,
+        touch_depth: float = 0.002,
+        clearance: float = 0.0,
+        progress: bool | None = None,
+    ) -> list[Pregrasp]:
+        """The posture of the hand before each grasp (n,); much quicker than one by one. See :meth:`Grasp.pregrasp`.
+
+        Args:
+            distance: How far the contact points are off the object [m].
+            touch_depth: Depth to which a touching link may sink into the object on the way [m].
+            clearance: Distance that all other pairs of shapes must keep [m].
+            progress: Show a progress bar; by default when standard error is a terminal.
+
+        Raises:
+            GraspAtlasError: If a number makes no sense, or hand or object has no collision shape.
+        """
+        depths = {"touch_depth": touch_depth, "clearance": clearance}
+        return pregrasps(self.problem, self.x, distance, **depths, progress=progress)
 
     def __getitem__(self, i: int) -> Grasp:
         one = Grasps(self.problem, self.x[i], self.system) if len(self) > 1 else self  # computed for this grasp alone

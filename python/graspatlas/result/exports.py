@@ -6,7 +6,7 @@ import json
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypedDict
 
@@ -14,6 +14,7 @@ import numpy as np
 from typing_extensions import Unpack
 
 from graspatlas.errors import GraspAtlasError
+from graspatlas.execution.pregrasp import Pregrasp
 from graspatlas.grasps.columns import contact_columns, grasp_columns
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.hand.urdf import root_link
@@ -55,6 +56,7 @@ class Selection:
         refined: True for the refined best, which is no chart's centre [n].
         accepted: Whether each meets the result's requirements [n].
         indices: Values of the result's indices by name, [n] each; NaN where one was not stored.
+        pregrasps: The posture before each grasp [n]; None where none was asked for.
     """
 
     grasps: Grasps
@@ -62,11 +64,13 @@ class Selection:
     refined: BoolArray
     accepted: BoolArray
     indices: dict[str, Array]
+    pregrasps: Sequence[Pregrasp] | None = None
 
     def columns(self) -> dict[str, AnyArray]:
-        """Columns of a flat table: chart, flags, indices, joints, poses and contacts."""
+        """Columns of a flat table: chart, flags, indices, joints, poses, contacts, and the pregrasp's joints."""
         flags = {"chart": self.charts, "refined": self.refined, "accepted": self.accepted}
-        return joined(flags, self.indices, grasp_columns(self.grasps), contact_columns(self.grasps))
+        before = {} if self.pregrasps is None else _pregrasp_columns(self.grasps.joints, self.pregrasps)
+        return joined(flags, self.indices, grasp_columns(self.grasps), contact_columns(self.grasps), before)
 
     def records(self) -> list[PlainTable]:
         """One table a grasp, as the JSON file has it."""
@@ -88,6 +92,7 @@ class Selection:
                     {"frame": frame, "point": point, "normal": normal}
                     for frame, point, normal in zip(grasps.contact_frames, points[i], normals[i], strict=True)
                 ],
+                **({} if self.pregrasps is None else {"pregrasp": _pregrasp_record(self.pregrasps[i])}),
             }
             for i in range(len(grasps))
         ]
@@ -148,12 +153,15 @@ def _at(result: GraspAtlas, x: Array, name: str) -> Array:
     return evaluate(name, Grasps(result.problem, x, system))
 
 
-def save_grasps(result: GraspAtlas, path: str | os.PathLike[str], **choice: Unpack[Choice]) -> int:
+def save_grasps(
+    result: GraspAtlas, path: str | os.PathLike[str], pregrasp: float | None = None, **choice: Unpack[Choice]
+) -> int:
     """Write grasps of a result; see :meth:`graspatlas.Result.save_grasps`.
 
     Args:
         result: The result.
         path: Ends in one of ``ENDINGS``.
+        pregrasp: Distance of the postures before the grasps [m]; None for none.
         **choice: Arguments of :func:`select`.
 
     Returns:
@@ -163,6 +171,8 @@ def save_grasps(result: GraspAtlas, path: str | os.PathLike[str], **choice: Unpa
     if target.suffix not in ENDINGS:
         raise GraspAtlasError(f"a file of grasps must end in {' or '.join(ENDINGS)}, got '{target}'")
     selection = select(result, **choice)
+    if pregrasp is not None:
+        selection = replace(selection, pregrasps=selection.grasps.pregrasps(pregrasp))
     if target.suffix == ".csv":
         write_csv(target, selection.columns())
     else:
@@ -188,6 +198,7 @@ def _header(result: GraspAtlas, selection: Selection) -> PlainTable:
             "xyz": "m",
             "point": "m",
             "quat_xyzw": "unit quaternion x y z w",
+            **({} if selection.pregrasps is None else {"distance": "m"}),
             "joints": {joint.name: "m" if joint.prismatic else "rad" for joint in problem.hand.model.hand_joints},
         },
         "quality": quality_name(result.quality),
@@ -196,6 +207,26 @@ def _header(result: GraspAtlas, selection: Selection) -> PlainTable:
         "n_charts": result.atlas.n_charts,
         "n_grasps": len(selection.grasps),
     }
+
+
+def _pregrasp_record(pregrasp: Pregrasp) -> PlainTable:
+    """A posture before a grasp, as the JSON file has it."""
+    return {
+        "joints": dict(pregrasp.joint_positions),
+        "distance": pregrasp.distances.tolist(),
+        "reached": pregrasp.reached,
+        "reason": pregrasp.reason,
+    }
+
+
+def _pregrasp_columns(joints: Sequence[str], pregrasps: Sequence[Pregrasp]) -> dict[str, AnyArray]:
+    """Columns of the postures before grasps: each joint, the distance of each contact, and whether it was reached."""
+    columns: dict[str, AnyArray] = {
+        f"pregrasp_{joint}": np.array([pregrasp.joint_positions[joint] for pregrasp in pregrasps]) for joint in joints
+    }
+    distances = np.array([pregrasp.distances for pregrasp in pregrasps])
+    columns |= {f"pregrasp_distance{i}": column for i, column in enumerate(distances.T)}
+    return columns | {"pregrasp_reached": np.array([pregrasp.reached for pregrasp in pregrasps])}
 
 
 def _finite(value: float) -> float | None:

@@ -11,7 +11,7 @@ from graspatlas.atlas.verification import CheckReport
 from graspatlas.grasps.columns import grasp_columns, parameter_columns
 from graspatlas.grasps.grasps import Grasp, Grasps
 from graspatlas.quality.batched import quality_name
-from graspatlas.result.exports import save_grasps
+from graspatlas.result.exports import Choice, save_grasps
 from graspatlas.result.files import read_result, save_result
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.result.summary import GraspSummary, OtherSummary, RefinementSummary, ResultSummary
@@ -41,6 +41,7 @@ class Result(GraspAtlas):
         best: int | None = None,
         accepted: bool = False,
         refined: bool = False,
+        pregrasp: float | None = None,
     ) -> int:
         """Write grasps for other programs: joints by name, poses of palm and object, contacts, values of the indices.
 
@@ -54,15 +55,19 @@ class Result(GraspAtlas):
             best: Only so many, the best that meet the requirements, the best first.
             accepted: Only those that meet the requirements.
             refined: Put the refined best before the others.
+            pregrasp: Add the joint positions at which all contact points are off the object by this distance [m], as
+                :meth:`graspatlas.Grasp.pregrasp` finds them, and whether they were reached.
 
         Returns:
             How many grasps were written.
 
         Raises:
             GraspAtlasError: If the file has another ending or cannot be written, there is no such chart, no grasp meets
-                the requirements where some must, or `refined` was asked for and the result was not refined.
+                the requirements where some must, `refined` was asked for and the result was not refined, or the
+                pregrasp's distance makes no sense.
         """
-        return save_grasps(self, path, charts=charts, best=best, accepted=accepted, refined=refined)
+        choice: Choice = {"charts": charts, "best": best, "accepted": accepted, "refined": refined}
+        return save_grasps(self, path, pregrasp, **choice)
 
     def to_pandas(self, *, volumes: bool = False) -> DataFrame:
         """The atlas as a table, one row a chart: indices, joints, poses and what :meth:`Atlas.to_pandas` tells.
