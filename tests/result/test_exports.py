@@ -414,6 +414,31 @@ def test_export_command(folder: Path, result: ga.Result, capfd: pytest.CaptureFi
     pd.testing.assert_frame_equal(read, result.to_pandas(), rtol=1e-14)
 
 
+def test_pregrasps_in_files(folder: Path, result: ga.Result, capfd: pytest.CaptureFixture[str]) -> None:
+    files = folder / "grasps.json", folder / "grasps.csv"
+    reached = [before.reached for before in ga.Grasps(result.problem, result.atlas.centers).pregrasps(0.005)]
+    charts = [reached.index(True), reached.index(False)]
+    for file in files:
+        status, _, _ = run(capfd, "export", folder, "--grasps", file, "--chart", *charts, "--pregrasp", 0.005)
+        assert status == 0
+    data = json.loads(files[0].read_text(encoding="utf-8"))
+    assert (data["version"], data["units"]["distance"]) == (2, "m")
+    for record, row in zip(data["grasps"], rows_of(files[1]), strict=True):
+        before = result.grasp(record["chart"]).pregrasp(0.005)
+        stated = record["pregrasp"]
+        assert list(stated["joints"]) == list(result.problem.hand.joints)
+        assert_allclose(list(stated["joints"].values()), list(before.joint_positions.values()), atol=1e-9)
+        assert_allclose(stated["distance"], before.distances, atol=1e-9)
+        assert (stated["reached"], stated["reason"]) == (before.reached, before.reason)
+        for name, position in stated["joints"].items():
+            assert float(row[f"pregrasp_{name}"]) == position
+        assert [float(row[f"pregrasp_distance{i}"]) for i in range(3)] == stated["distance"]
+        assert row["pregrasp_reached"] == str(stated["reached"]).lower()
+    assert [record["pregrasp"]["reached"] for record in data["grasps"]] == [True, False]
+    result.save_grasps(files[0], best=3)
+    assert "pregrasp" not in files[0].read_text(encoding="utf-8")
+
+
 def test_export_command_refuses(folder: Path, result: ga.Result, capfd: pytest.CaptureFixture[str]) -> None:
     out = folder / "g.csv"
     for words, message in (
@@ -423,6 +448,8 @@ def test_export_command_refuses(folder: Path, result: ga.Result, capfd: pytest.C
         (["export", folder, "--table", folder / "t.xlsx"], r"must end in \.csv or \.parquet"),
         (["export", folder, "--grasps", out, "--chart", "middle"], "'middle' names no grasp"),
         (["export", folder, "--grasps", out, "--chart", "1", "--best", "2"], "give either charts"),
+        (["export", folder, "--grasps", out, "--pregrasp", "10"], r"pregrasp must be above 0 and at most 0\.1, got 10"),
+        (["export", folder, "--table", folder / "t.csv", "--pregrasp", "0.01"], "give --grasps FILE too"),
         (["path", folder, "--joint-speed", "1"], "--joint-speed is for the table: give --csv FILE too"),
         (["path", folder, "--joint-speed", "slow", "--csv", out], "joint_speed must be .* got 'slow'"),
     ):

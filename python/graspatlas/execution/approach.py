@@ -78,7 +78,7 @@ def approach(
     """The way from a pregrasp to its grasp; see :meth:`graspatlas.Grasp.approach` for the arguments.
 
     Raises:
-        GraspAtlasError: If a time is not positive, there are too many points, or the squeeze names no joint of the hand.
+        GraspAtlasError: If a time is not positive, points are too many, or the squeeze names no joint of the hand.
     """
     for value, name in ((seconds, "seconds"), (time_step, "time_step"), (squeeze_seconds, "squeeze_seconds")):
         positive(value, name)
