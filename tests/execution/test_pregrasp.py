@@ -139,10 +139,11 @@ def test_a_hand_that_cannot_open() -> None:
     problem = ga.load_problem("allegro_sphere_3")
     at = grasp_of(problem).joint_positions
     grasp = grasp_of(with_limits(problem, {name: (at[name] - 1e-12, at[name] + 1e-12) for name in THUMB}))
-    before = grasp.pregrasp()
-    assert not before.reached
-    assert "gets 0.0 mm away" in before.reason
-    np.testing.assert_array_equal(before.x, grasp.x)
+    for distance in (1e-5, 0.01):
+        before = grasp.pregrasp(distance)
+        assert not before.reached
+        assert "gets 0.0 mm away" in before.reason
+        np.testing.assert_allclose(before.x, grasp.x, atol=1e-11)
 
 
 def test_fingers_that_would_collide() -> None:
@@ -164,6 +165,20 @@ def test_a_grasp_in_collision() -> None:
     assert not before.reached
     assert "come nearer than 0.05 m at the grasp already" in before.reason
     np.testing.assert_array_equal(before.x, grasp.x)
+
+
+def test_fingertips_that_sink_in_at_the_grasp() -> None:
+    """Collision shapes of fingertips reach 1.5 mm into the object: a millimetre does not part them, three do."""
+    problem = ga.load_problem("allegro_sphere_3")
+    thick = replace(
+        problem.hand, urdf=problem.hand.urdf.replace('<sphere radius="0.012" />', '<sphere radius="0.0135" />')
+    )
+    grasp = grasp_of(replace(problem, hand=thick))
+    near, far = grasp.pregrasp(0.001), grasp.pregrasp(0.003)
+    assert (near.reached, far.reached) == (False, True)
+    assert "'object/sphere_0' collide at the grasp already" in near.reason
+    np.testing.assert_array_equal(near.x, grasp.x)
+    assert CollisionChecker(grasp.problem, touch_depth=0.0).free(far.x[None]).all()
 
 
 def test_contacts_that_one_motor_moves_unequally() -> None:

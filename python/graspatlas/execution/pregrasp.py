@@ -9,7 +9,7 @@ import numpy as np
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.execution.actuation import Actuation
-from graspatlas.execution.walk import TOLERANCE, Obstacle, Walk, walk_outwards
+from graspatlas.execution.walk import Obstacle, Walk, is_there, walk_outwards
 from graspatlas.execution.withdrawal import Withdrawal
 from graspatlas.problem.problem import Problem
 from graspatlas.support.arrays import Array
@@ -39,7 +39,7 @@ class Pregrasp:
         asked: How far the contact points were to be off the object [m].
         distances: How far they are: each contact point of the hand, which stays where it is in its link, along the
             object's outward normal at the contact [m], metres.
-        reached: Whether all are as far off as asked, to 0.1 mm. If not, this is the farthest that the hand can get
+        reached: Whether all are as far off as asked, to 0.1 mm and a twentieth of it. If not, this is the farthest that the hand can get
             with all contact points equally far off.
         reason: Why not: the joint that stands at its limit, or what would collide; empty when reached.
         path: The grasp with the hand in each posture on the way out, from the grasp to this one
@@ -130,7 +130,7 @@ class _Asked:
 def _pregrasp(withdrawal: Withdrawal, row: int, walk: Walk, asked: _Asked) -> Pregrasp:
     hand, x, distances = withdrawal.problem.hand, walk.X[-1], walk.distances[-1]
     q = x[: hand.model.hand_q_size]
-    reached = bool(distances.min() >= asked.distance - TOLERANCE)
+    reached = bool(is_there(distances[None], asked.distance)[0])
     return Pregrasp(
         x=read_only(x),
         q=read_only(q),
@@ -151,7 +151,7 @@ def _reason(withdrawal: Withdrawal, row: int, obstacle: Obstacle, distances: Arr
     if obstacle.pair is not None:
         shapes = f"'{obstacle.pair[0]}' and '{obstacle.pair[1]}' {asked.collide}"
         if obstacle.target == 0.0:
-            return f"{shapes} at the grasp already, and no opening of the hand parts them"
+            return f"{shapes} at the grasp already, and so small an opening does not part them"
         return f"{farther}: then {shapes}"
     contact = int(np.argmin(obstacle.distances))
     where = f"contact {contact} ('{withdrawal.problem.contacts[contact].frame}')"

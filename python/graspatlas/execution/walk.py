@@ -11,10 +11,10 @@ from graspatlas.execution.withdrawal import Withdrawal
 from graspatlas.problem.problem import Problem
 from graspatlas.support.arrays import Array, BoolArray, IndexArray
 
-__all__ = ["TOLERANCE", "Obstacle", "Walk", "walk_outwards"]
+__all__ = ["Obstacle", "Walk", "is_there", "walk_outwards"]
 
-#: How far a contact point may be from where a step of the walk wants it [m].
-TOLERANCE = 1e-4
+#: How far a contact point may be from where a step of the walk wants it [m], and as a share of the distance.
+TOLERANCE, SHARE = 1e-4, 0.05
 #: A step of the walk, at most [m], and how many there are at least.
 STEP, FEWEST_STEPS = 1e-3, 4
 #: How often the step that fails is halved, to find out how far one can go.
@@ -57,6 +57,11 @@ class Walk:
     obstacle: Obstacle | None
 
 
+def is_there(distances: Array, targets: Array | float) -> BoolArray:
+    """Whether all contact points of grasps (n, m) are as far off as they shall be (n,), metres."""
+    return np.asarray(distances.min(axis=1) >= targets - np.minimum(TOLERANCE, SHARE * np.asarray(targets)))
+
+
 class _Walkers:
     """All walks at once: what each has gone through, and what ended it."""
 
@@ -96,7 +101,7 @@ class _Walkers:
         before = np.array([self.steps[i][-1][1] for i in rows])
         distances_before = np.array([self.steps[i][-1][2] for i in rows])
         z, distances = self._withdrawn(before, targets, rows)
-        there = (distances.min(axis=1) >= targets - TOLERANCE) & (distances.max(axis=1) <= MOST_UNEQUAL * targets)
+        there = is_there(distances, targets) & (distances.max(axis=1) <= MOST_UNEQUAL * targets)
         there &= (distances > distances_before).all(axis=1)
         X = self._withdrawal.at(z, rows)
         free = self._free(X, rows)
@@ -114,7 +119,7 @@ class _Walkers:
         scaled = targets.copy()
         for _ in range(SCALINGS):
             least = distances.min(axis=1)
-            short = np.flatnonzero((least < targets - TOLERANCE) & (least > 0.0))
+            short = np.flatnonzero(~is_there(distances, targets) & (least > 0.0))
             if len(short) == 0:
                 break
             scaled[short] *= np.minimum(targets[short] / least[short], MOST_UNEQUAL)
@@ -148,10 +153,11 @@ class _Walkers:
             steps = self.steps[i]
             way = self._withdrawal.at(np.array([z for _, z, _ in steps]), np.full(len(steps), i))
             clear = np.flatnonzero(self._at_end.free(way))
-            if i in self._least and len(clear) == 0:
-                self.obstacles[i] = Obstacle(self._on_way.first_collision(self._X[i]), steps[0][1], 0.0, steps[0][2])
+            target, z, distances = steps[-1]
+            if len(clear) == 0 and (i in self._least or self.obstacles[i] is None):
+                within = self._on_way.first_collision(self._X[i]) or self._at_end.first_collision(X[i])
+                self.obstacles[i] = Obstacle(within, steps[0][1], 0.0, steps[0][2])
             elif self.obstacles[i] is None:
-                target, z, distances = steps[-1]
                 self.obstacles[i] = Obstacle(self._at_end.first_collision(X[i]), z, target, distances)
             del steps[(clear[-1] if len(clear) else 0) + 1 :]
 

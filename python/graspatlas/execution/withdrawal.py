@@ -26,7 +26,7 @@ __all__ = ["Withdrawal"]
 #: Weights w_t of the displacements along the surface, and w_z of the joints [m], where that along the normal has 1.
 TANGENTIAL, REST = 0.05, 5e-4
 #: Steps of Gauss and Newton, at most; they end when no joint moves by more than this [units of the joints].
-MOST_STEPS, SMALL_STEP = 30, 1e-6
+MOST_STEPS, SMALL_STEP = 30, 1e-5
 #: Damping when a step made the sum of squares larger [m^2], what it then grows by, and the least there is.
 DAMPING, HARDER, LEAST_DAMPING = 1e-6, 10.0, 1e-9
 
