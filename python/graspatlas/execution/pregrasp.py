@@ -39,8 +39,8 @@ class Pregrasp:
         asked: How far the contact points were to be off the object [m].
         distances: How far they are: each contact point of the hand, which stays where it is in its link, along the
             object's outward normal at the contact [m], metres.
-        reached: Whether all are as far off as asked, to 0.1 mm and a twentieth of it. If not, this is the farthest that the hand can get
-            with all contact points equally far off.
+        reached: Whether all are at least as far off as asked, to 0.1 mm and a twentieth of it. If not, this is the
+            farthest that the hand can get with all contact points equally far off.
         reason: Why not: the joint that stands at its limit, or what would collide; empty when reached.
         path: The grasp with the hand in each posture on the way out, from the grasp to this one
             [k, configuration_size].
