@@ -54,10 +54,12 @@ class CollisionChecker:
     """Tells whether a grasp is free of collision: hand with itself, and hand with object.
 
     Pairs of links that the hand's SRDF lists may touch. The links that carry a contact touch the object; they may sink
-    into it by `touch_depth`, since a collision shape only approximates the surface. Meshes that bound a convex solid
-    are solid. Other meshes of a link with a contact count by their convex hulls where they meet the object; those of an
-    object are surfaces, and what touches them is made thinner by `touch_depth`. Hulls with more than some 250 corners
-    are thinned, to 0.1 mm; `thinned` tells which.
+    into it by `touch_depth`, since a collision shape only approximates the surface. Other links keep `clearance`, those
+    that are fixed to them too; which link carries a contact whose frame has no shapes of its own says
+    :attr:`graspatlas.collision.problem_shapes.CollisionShapes.touching`. Meshes that bound a convex solid are solid.
+    Other meshes of a link with a contact count by their convex hulls where they meet the object; those of an object are
+    surfaces, and what touches them is made thinner by `touch_depth`. Hulls with more than some 250 corners are thinned,
+    to 0.1 mm; `thinned` tells which.
 
     Any number of threads may use one checker. Answers are functions of the grasp alone.
 
@@ -195,12 +197,11 @@ def _joined(
     shapes = list(stated.hand)
     in_hand = list(enumerate(shapes))
     pairs = [_Pair(a, b, clearance) for a, b in stated.hand_pairs]
-    touching = {problem.hand.frame(contact.frame)[0] for contact in problem.contacts}
     for shape in stated.object:
         second = len(shapes)
         shapes.append(replace(shape, name=OBJECT + shape.name, joint=object_joint))
         for first, of_link in in_hand:
-            if of_link.joint not in touching:
+            if first not in stated.touching:
                 pairs.append(_Pair(first, second, clearance))
             elif not (of_link.is_mesh or shape.is_mesh):
                 pairs.append(_Pair(first, second, -touch_depth))

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 from graspatlas.collision.shapes import Shape, convex_solid, read_shapes
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.mesh_files import check_meshes
+from graspatlas.hand.urdf import fixed_parents
 
 if TYPE_CHECKING:
     from graspatlas.hand.body import Body
@@ -28,11 +29,15 @@ class CollisionShapes:
         object: Shapes of the object, placed in its own frame.
         ignored: Pairs of numbers of ``hand``, the smaller first, that may touch: shapes of one joint, links that the
             SRDF lists, and without an SRDF those of neighbouring joints.
+        touching: Numbers of ``hand`` that touch the object: for each contact the shapes of the link that it is stated
+            on. A link without shapes, such as a mere frame, stands for the next one that it is fixed to and that has
+            some; where there is none, for all that the same joint carries.
     """
 
     hand: tuple[Shape, ...]
     object: tuple[Shape, ...]
     ignored: frozenset[tuple[int, int]]
+    touching: frozenset[int]
 
     @property
     def hand_pairs(self) -> tuple[tuple[int, int], ...]:
@@ -50,7 +55,8 @@ def collision_shapes(problem: Problem) -> CollisionShapes:
         GraspAtlasError: If hand or object has no collision shape, or a mesh or the SRDF cannot be read.
     """
     hand = _shapes(problem.hand, problem.hand.tree)
-    return CollisionShapes(hand, _shapes(problem.object, problem.object.urdf), _ignored(hand, problem.hand))
+    of_object = _shapes(problem.object, problem.object.urdf)
+    return CollisionShapes(hand, of_object, _ignored(hand, problem.hand), _touching(hand, problem))
 
 
 def _shapes(body: Body, tree: str) -> tuple[Shape, ...]:
@@ -76,6 +82,20 @@ def _ignored(shapes: tuple[Shape, ...], hand: Hand) -> frozenset[tuple[int, int]
         or (not hand.srdf and (a.parent_joint == b.joint or b.parent_joint == a.joint))
         or frozenset((a.link, b.link)) in listed
     )
+
+
+def _touching(shapes: tuple[Shape, ...], problem: Problem) -> frozenset[int]:
+    """Numbers of the hand's shapes that touch the object."""
+    held = {shape.link for shape in shapes}
+    parents = fixed_parents(problem.hand.tree)
+    found: set[int] = set()
+    for frame in {contact.frame for contact in problem.contacts}:
+        link: str | None = frame
+        while link is not None and link not in held:
+            link = parents.get(link)
+        joint = problem.hand.frame(frame)[0]
+        found.update(i for i, s in enumerate(shapes) if (s.joint == joint if link is None else s.link == link))
+    return frozenset(found)
 
 
 def _disabled(hand: Hand) -> set[frozenset[str]]:

@@ -16,6 +16,7 @@ from graspatlas.support.arrays import Array
 __all__ = [
     "box_urdf",
     "cylinder_urdf",
+    "fixed_parents",
     "joint_limits",
     "joints_of_kind",
     "lock_joints",
@@ -91,6 +92,21 @@ def root_link(urdf: str) -> str:
     root = ElementTree.fromstring(urdf)
     children = {str(child.get("link")) for joint in root.findall("joint") for child in joint.findall("child")}
     return next((name for link in root.findall("link") if (name := str(link.get("name"))) not in children), "")
+
+
+def fixed_parents(urdf: str) -> dict[str, str]:
+    """The link that each link is fixed to, by the name of the link that a fixed joint carries.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    fixed = [joint for joint in ElementTree.fromstring(urdf).findall("joint") if joint.get("type") == "fixed"]
+    ends = [(joint.find("child"), joint.find("parent")) for joint in fixed]
+    return {
+        str(child.get("link")): str(parent.get("link"))
+        for child, parent in ends
+        if child is not None and parent is not None
+    }
 
 
 def mimics(urdf: str) -> tuple[Mimic, ...]:

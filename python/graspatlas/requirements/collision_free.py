@@ -26,7 +26,7 @@ class CollisionFree(Requirement):
     """The hand hits neither itself nor the object, the touching fingertips excepted; by coal.
 
     Attributes:
-        touch_depth: Depth to which a touching link may sink into the object, since shapes are approximations [m].
+        touch_depth: Depth to which a link with a contact may sink into the object, since shapes are approximations [m].
         clearance: Distance that all other pairs of shapes must keep [m].
     """
 
