@@ -225,6 +225,20 @@ def disc(
 # Convex hulls ------------------------------------------------------------------------------------
 
 
+def turned_solid(outline: ArrayLike, sides: int, axis: str = "y") -> Mesh:
+    """Return the convex solid over rings of (station, radius) pairs: polygons half a sagitta outside the circles.
+
+    Its surface is then within half the sagitta, radius (1 - cos(pi / sides)) / 2, of what the outline's chords turn to.
+    """
+    outline = np.asarray(outline, float) * (1.0, 2.0 / (1.0 + np.cos(np.pi / sides)))
+    return hull_mesh(lathe(outline, sides, axis).vertices)
+
+
+def hull_mesh(points: ArrayLike) -> Mesh:
+    """Return the convex hull of points, rounded as in files."""
+    return _hull_mesh(np.unique(np.round(np.asarray(points, float), COORDINATE_DECIMALS), axis=0))
+
+
 def convex_hull(points: ArrayLike, max_vertices: int = 60) -> Mesh:
     """Return a convex mesh over the outermost of the points, chosen farthest first.
 

@@ -1,7 +1,8 @@
 """Make the meshes of the can and of the oil bottle: ``python robots/objects/make_meshes.py``.
 
 Both are turned about y from their outlines (source: RSS 2011, experiment data released by the
-paper's authors), and so is the spout's place. The recesses of the can, its label and tab and the
+paper's authors), from which the spout's place is too. Where fingers may touch, the outlines follow
+the contact surfaces of the same data, which differ from them by up to 0.5 mm. The recesses of the can, its label and tab and the
 oil are our own decoration.
 """
 
@@ -14,33 +15,30 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from mesh_tools import Array, Loft, Mesh, convex_hull, disc, lathe, merged, write_all
+from mesh_tools import Array, Loft, Mesh, disc, lathe, merged, turned_solid, write_all
 
 FOLDER = Path(__file__).resolve().parent / "meshes"
 
 # Outlines: station y and radius [m] ---------------------------------------------------------------
 
-CAN_BOTTOM = [(-0.04552, 0.01696), (-0.04283, 0.01740), (-0.04046, 0.02119), (-0.03753, 0.02229)]
-CAN_TOP = [(0.02546, 0.02229), (0.02904, 0.02154), (0.03454, 0.01784), (0.03899, 0.01778)]
+#: Where fingers touch, the outlines are those of the released contact surfaces: a cylinder and three cones.
+CAN_WALL, CAN_BOTTOM_Y, CAN_TOP_Y = 0.02224, -0.03753, 0.0272
+CAN_BOTTOM = [(-0.04552, 0.01696), (-0.04283, 0.01740), (-0.04046, 0.02119), (CAN_BOTTOM_Y, CAN_WALL)]
+CAN_TOP = [(CAN_TOP_Y, CAN_WALL), (0.02904, 0.02154), (0.03454, 0.01784), (0.03899, 0.01778)]
 
-BOTTLE_BASE = [
-    (-0.1000, 0.0426),
-    (-0.0978, 0.0468),
-    (-0.0955, 0.0476),
-    (-0.0931, 0.0472),
-    (0.0000, 0.0101),
-]
+BOTTLE_FOOT = [(-0.1000, 0.0426), (-0.0978, 0.0468), (-0.0955, 0.0476), (-0.0931, 0.04724)]
+BOTTLE_CONE = [(-0.0931, 0.04724), (0.0000, 0.0100)]
 BOTTLE_NECK = [(0.0010, 0.0100), (0.0185, 0.0100)]
-BOTTLE_COLLAR = [(0.0204, 0.0104), (0.0400, 0.0230), (0.0408, 0.0217)]
-BOTTLE_TUBE = [(0.04081, 0.0085), (0.0894, 0.0085)]
-BOTTLE_TIP = [(0.0915, 0.0080), (0.0922, 0.0076), (0.0930, 0.0070), (0.1000, 0.0000)]
+BOTTLE_COLLAR = [(0.0200, 0.0100), (0.0400, 0.0230), (0.0408, 0.0217)]
+BOTTLE_TUBE = [(0.04081, 0.0085), (0.0915, 0.0085)]
+BOTTLE_TIP = [(0.0915, 0.0085), (0.1000, 0.0000)]
 
 SEGMENTS = 72
 
 
 def can_label() -> Mesh:
     """Return the coloured wall of the can."""
-    return lathe([(-0.03753, 0.0), (-0.03753, 0.02229), (0.02546, 0.02229), (0.02546, 0.0)], SEGMENTS)
+    return lathe([(CAN_BOTTOM_Y, 0.0), CAN_BOTTOM[-1], CAN_TOP[0], (CAN_TOP_Y, 0.0)], SEGMENTS)
 
 
 def can_wave() -> Mesh:
@@ -54,7 +52,7 @@ def can_wave() -> Mesh:
     )
 
 
-def _band(u: Array, low: Array, high: Array, radius: float = 0.02234) -> Mesh:
+def _band(u: Array, low: Array, high: Array, radius: float = CAN_WALL + 0.00005) -> Mesh:
     """Return a closed band around y between two heights given over the angle u."""
     inside = radius - 0.0003
     levels = [(low, inside), (low, radius), (high, radius), (high, inside)]
@@ -87,7 +85,7 @@ def can_top() -> Mesh:
         (0.03750, 0.01500),
         (0.0375, 0.0),
     ]
-    return lathe([(0.0254, 0.0), *CAN_TOP, *lid], SEGMENTS)
+    return lathe([(CAN_TOP_Y, 0.0), *CAN_TOP, *lid], SEGMENTS)
 
 
 def can_tab() -> Mesh:
@@ -122,7 +120,7 @@ def can_hole() -> Mesh:
 
 def bottle_glass() -> Mesh:
     """Return the glass: base cone, neck and collar."""
-    outline = [(-0.1, 0.0), *BOTTLE_BASE, *BOTTLE_NECK, *BOTTLE_COLLAR, (0.0408, 0.0)]
+    outline = [(-0.1, 0.0), *BOTTLE_FOOT, BOTTLE_CONE[1], *BOTTLE_NECK, *BOTTLE_COLLAR, (0.0408, 0.0)]
     return lathe(outline, SEGMENTS)
 
 
@@ -136,7 +134,7 @@ def bottle_oil() -> Mesh:
 
 def bottle_tube() -> Mesh:
     """Return the steel pourer: the tube, its conical tip and the spout to the side."""
-    tube = lathe([(0.0405, 0.0), (0.0405, 0.0085), *BOTTLE_TUBE, *BOTTLE_TIP], 56)
+    tube = lathe([(0.0405, 0.0), (0.0405, 0.0085), *BOTTLE_TUBE, *BOTTLE_TIP[1:]], 56)
     pipe = [
         (0.0040, 0.0030),
         (0.0183, 0.0030),
@@ -146,13 +144,6 @@ def bottle_tube() -> Mesh:
     ]
     spout = lathe([*pipe, (0.0172, 0.0)], 28, axis="x")
     return merged(tube, spout.moved(np.eye(3), (0.0, 0.0945, 0.0)))
-
-
-def rings(outline: list[tuple[float, float]], sides: int) -> Mesh:
-    """Return the convex body over rings of `sides` points, half a sagitta outside the circle."""
-    swell = 2.0 / (1.0 + np.cos(np.pi / sides))
-    solid = lathe([(y, radius * swell) for y, radius in outline], sides)
-    return convex_hull(solid.vertices, 10 * sides)
 
 
 VISUAL = {
@@ -167,12 +158,14 @@ VISUAL = {
     "bottle_tube": bottle_tube,
 }
 
+#: The wall of the can, and neck, tube and spout of the bottle are cylinders in the URDFs.
 COLLISION = {
-    "can_bottom_convex": lambda: rings([CAN_BOTTOM[0], CAN_BOTTOM[2], CAN_BOTTOM[3]], 20),
-    "can_top_convex": lambda: rings([CAN_TOP[0], CAN_TOP[1], CAN_TOP[3]], 20),
-    "bottle_base_convex": lambda: rings([BOTTLE_BASE[0], BOTTLE_BASE[2], BOTTLE_BASE[4]], 20),
-    "bottle_collar_convex": lambda: rings([BOTTLE_NECK[1], *BOTTLE_COLLAR[1:]], 20),
-    "bottle_tip_convex": lambda: rings([BOTTLE_TUBE[1], *BOTTLE_TIP[:3:2], (0.0998, 0.0002)], 16),
+    "can_bottom_convex": lambda: turned_solid([CAN_BOTTOM[0], *CAN_BOTTOM[2:]], 60),
+    "can_top_convex": lambda: turned_solid([*CAN_TOP[:2], CAN_TOP[3]], 60),
+    "bottle_foot_convex": lambda: turned_solid(BOTTLE_FOOT, 60),
+    "bottle_cone_convex": lambda: turned_solid(BOTTLE_CONE, 120),
+    "bottle_collar_convex": lambda: turned_solid(BOTTLE_COLLAR, 80),
+    "bottle_tip_convex": lambda: turned_solid(BOTTLE_TIP, 60),
 }
 
 

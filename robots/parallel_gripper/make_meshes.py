@@ -7,6 +7,7 @@ design, with about the proportions of a bowling pin.
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from graspatlas.patches import Revolution
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from mesh_tools import Mesh, convex_hull, lathe, merged, write_all
+from mesh_tools import Mesh, lathe, merged, turned_solid, write_all
 
 FOLDER = Path(__file__).resolve().parent / "meshes"
 
@@ -56,18 +57,25 @@ def skittle_stripes() -> Mesh:
 
 
 def convex(low: float, high: float, count: int = 2) -> Mesh:
-    """Return the convex hull of rings of the side, for collision checks."""
-    rings = lathe([(low, 0.0), *outline(low, high, count), (high, 0.0)], 24)
-    return convex_hull(rings.vertices, 24 * count)
+    """Return the convex solid over rings of the side, for collision checks."""
+    return turned_solid(outline(low, high, count), SIDES)
+
+
+def slices(name: str, low: float, high: float, count: int, rings: int) -> dict[str, Callable[[], Mesh]]:
+    """Return convex solids between two heights, by name."""
+    ends = np.linspace(low, high, count + 1)
+    return {
+        f"skittle_{name}_{i}_convex": partial(convex, float(ends[i]), float(ends[i + 1]), rings) for i in range(count)
+    }
 
 
 VISUAL = {"skittle_body": skittle_body, "skittle_stripes": skittle_stripes}
-SLICES = 5
-ENDS = np.linspace(*HOLLOW, SLICES + 1)
+#: Belly and head, which flat pads can touch, are within 0.025 mm of the spline. A solid has at most 250 corners.
+SIDES = 60
 COLLISION = {
-    "skittle_belly_convex": lambda: convex(HEIGHTS[0], HOLLOW[0], 7),
-    **{f"skittle_neck_{i}_convex": partial(convex, float(ENDS[i]), float(ENDS[i + 1])) for i in range(SLICES)},
-    "skittle_head_convex": lambda: convex(HOLLOW[1], HEIGHTS[-1], 5),
+    **slices("belly", HEIGHTS[0], HOLLOW[0], 7, 4),
+    **slices("neck", *HOLLOW, 5, 2),
+    **slices("head", HOLLOW[1], HEIGHTS[-1], 3, 4),
 }
 
 

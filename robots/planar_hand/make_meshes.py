@@ -14,7 +14,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from mesh_tools import Array, Mesh, convex_hull, write_all
+from mesh_tools import Array, Mesh, convex_hull, hull_mesh, write_all
 
 FOLDER = Path(__file__).resolve().parent / "meshes"
 
@@ -156,10 +156,16 @@ def pad_discs(length: float = 0.0) -> tuple[Array, Array]:
 
 
 def distal_hull(length: float) -> Mesh:
-    """Return the convex body of a distal phalanx and its pad."""
+    """Return the convex body of a distal phalanx and its pad, inside the cylinder that the URDF has at its tip."""
     joint = outline(*fingertip(length), step=np.deg2rad(22.5))
     pad = outline(*pad_discs(length), step=np.deg2rad(15.0))
-    return convex_hull(np.vstack([level(joint, z) for z in DISTAL_Z] + [level(pad, z) for z in PAD_Z]))
+    return hull_mesh(np.vstack([level(joint, z) for z in DISTAL_Z] + [level(pad, z) for z in PAD_Z]))
+
+
+def object_hull() -> Mesh:
+    """Return the convex body of the object behind its rims; the arcs themselves are cylinders in the URDF."""
+    points = outline(ARC_CENTERS, ARC_RADII - RIM_STEP, step=np.deg2rad(12.0))
+    return hull_mesh(np.vstack([level(points, z) for z in RIM_Z]))
 
 
 def rim(finger: str) -> Mesh:
@@ -187,7 +193,7 @@ COLLISION = {
     "palm_side_convex": palm_side,
     **{f"{n}_proximal_convex": partial(plate_hull, *phalanx(length), PROXIMAL_Z) for n, length in PROXIMAL.items()},
     **{f"{n}_distal_convex": partial(distal_hull, length) for n, length in DISTAL.items()},
-    "object_convex": partial(plate_hull, ARC_CENTERS, ARC_RADII, RIM_Z, np.deg2rad(12.0)),
+    "object_convex": object_hull,
 }
 
 

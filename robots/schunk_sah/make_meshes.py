@@ -9,6 +9,7 @@ palm's z points to the fingers, its x to the side they close to.
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from mesh_tools import (
     convex_hull,
     cushion,
     disc,
+    hull_mesh,
     lathe,
     merged,
     write_all,
@@ -191,9 +193,76 @@ THUMB_BASE = Loft(
 )
 
 
+# Where fingertips touch the can and the bottle: points [m] and outward normals, released data ------
+
+TOUCHES = {
+    "middle": [
+        ([0.0283695628566503, 0.00191290140151999, 0.012603126518669], [0.0085134960924787, 0.0, 0.999963759535456]),
+        (
+            [0.0302088748323417, -0.0102128336550385, 0.00758324285523667],
+            [0.191904288472871, -0.84962054218996, 0.491240957529561],
+        ),
+    ],
+    "index": [
+        (
+            [0.02904636402922, -1.13620059960939e-05, 0.012101738745285],
+            [0.156365247110253, 0.0176636278487548, 0.987541343816739],
+        ),
+        (
+            [0.0332787479046913, -0.00208980427317626, 0.0103517823390985],
+            [0.490320972629585, -0.125590057318285, 0.862445639621633],
+        ),
+    ],
+    "thumb": [
+        (
+            [0.0340555009657166, 0.00572220455526222, 0.00929765852059142],
+            [0.638176750393122, 0.125590441355928, 0.759577169415786],
+        ),
+        (
+            [0.0303814305222231, -1.98375193704885e-05, 0.0119782613698001],
+            [0.47640191161706, -0.102950871135041, 0.873179441317847],
+        ),
+    ],
+}
+#: Radius of the balls through these points that the URDF has as collision shapes [m].
+BALL = 0.006
+#: How far the meshes for collisions stay behind the planes that touch the balls there [m].
+BEHIND = 0.0002
+#: Radius of curvature of a pad at such a point, and distance from it where the pad has its own shape again [m].
+CURVE, BLEND = 0.012, 0.009
+
+
 def distal_pad() -> Mesh:
     """Return the rubber of a fingertip."""
     return cushion(DISTAL, DISTAL_COVER, (0.0085, 0.0376), (0.1 * np.pi, 0.9 * np.pi), (26, 24))
+
+
+def touching_pad(finger: str) -> Mesh:
+    """Return the rubber of a fingertip that runs through the points where it touches, with the normals there."""
+    pad = distal_pad()
+    vertices = pad.vertices.copy()
+    for place, normal in TOUCHES[finger]:
+        height = (vertices - place) @ normal
+        distance = np.linalg.norm(vertices - place, axis=1)
+        aside = np.sqrt(np.maximum(distance**2 - height**2, 0.0))
+        share = np.clip(1.0 - (distance / BLEND) ** 2, 0.0, 1.0) ** 2
+        wanted = (1.0 - share) * height - share * aside**2 / (2.0 * CURVE)
+        vertices += np.outer(wanted - height, normal)
+    return Mesh(vertices, pad.faces)
+
+
+def touching_hull(finger: str) -> Mesh:
+    """Return the convex body of a fingertip, cut off behind the planes in which it touches."""
+    body = points(DISTAL, touching_pad(finger), axle(DISTAL_AXLE))
+    return hull_mesh(_behind(convex_hull(_behind(body, finger)).vertices, finger))
+
+
+def _behind(cloud: Array, finger: str) -> Array:
+    """Return points, moved behind the planes in which a fingertip touches."""
+    for place, normal in TOUCHES[finger]:
+        height = (cloud - place) @ normal
+        cloud = cloud - np.outer(np.maximum(height + BEHIND, 0.0), normal)
+    return cloud
 
 
 def proximal_pad() -> Mesh:
@@ -301,6 +370,7 @@ VISUAL = {
     "distal": lambda: DISTAL.mesh(26, 36),
     "distal_joint": lambda: axle(DISTAL_AXLE),
     "distal_pad": distal_pad,
+    **{f"{finger}_distal_pad": partial(touching_pad, finger) for finger in TOUCHES},
     "distal_screws": lambda: screws(DISTAL_AXLE),
     "palm": lambda: PALM.mesh(24, 44),
     "palm_ridge": lambda: PALM_RIDGE.mesh(14, 40),
@@ -317,6 +387,7 @@ COLLISION = {
     "proximal_convex": lambda: convex_hull(points(PROXIMAL, proximal_pad(), axle(PROXIMAL_AXLE))),
     "medial_convex": lambda: convex_hull(points(MEDIAL, axle(MEDIAL_AXLE))),
     "distal_convex": lambda: convex_hull(points(DISTAL, distal_pad(), axle(DISTAL_AXLE))),
+    **{f"{finger}_distal_convex": partial(touching_hull, finger) for finger in TOUCHES},
     "palm_lower_convex": lambda: convex_hull(between(0.000, 0.076, points(PALM, palm_cover()))),
     "palm_upper_convex": lambda: convex_hull(between(0.064, 0.150, points(PALM, palm_cover()))),
     "palm_ridge_convex": lambda: convex_hull(points(PALM_RIDGE), 40),

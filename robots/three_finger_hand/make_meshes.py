@@ -12,7 +12,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from mesh_tools import Mesh, convex_hull, lathe, write_all
+from mesh_tools import Mesh, lathe, turned_solid, write_all
 
 FOLDER = Path(__file__).resolve().parent / "meshes"
 
@@ -49,10 +49,8 @@ def cup_sleeve() -> Mesh:
 
 
 def cup_convex() -> Mesh:
-    """Return the convex body for collision checks, half a sagitta outside the circles."""
-    swell = 2.0 / (1.0 + np.cos(np.pi / 28))
-    rings = lathe([(z, r * swell) for z, r in zip(HEIGHTS, RADII, strict=True)], 28, "z")
-    return convex_hull(rings.vertices, 56)
+    """Return the convex body for collision checks, within 0.01 mm of the cone."""
+    return turned_solid(list(zip(HEIGHTS, RADII, strict=True)), 120, "z")
 
 
 VISUAL = {"cup_wall": cup_wall, "cup_coffee": cup_coffee, "cup_sleeve": cup_sleeve}

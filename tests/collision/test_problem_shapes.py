@@ -54,7 +54,7 @@ def test_who_may_touch() -> None:
 
 
 def with_fixed_links(*frames: str) -> Any:
-    """A finger whose last joint carries a box, a ball fixed to it and a mere frame fixed to that; and a ball to hold."""
+    """A finger whose last joint carries a box, to which a ball is fixed and to that a mere frame; a ball to hold."""
     shapes = {
         "palm": '<box size="0.02 0.02 0.02"/>',
         "distal": '<box size="0.02 0.02 0.02"/>',
