@@ -2,8 +2,8 @@
 
 Both are turned about y from their outlines (source: RSS 2011, experiment data released by the
 paper's authors), from which the spout's place is too. Where fingers may touch, the outlines follow
-the contact surfaces of the same data, which differ from them by up to 0.5 mm. The recesses of the can, its label and tab and the
-oil are our own decoration.
+the contact surfaces of the same data, from which they differ by up to 0.5 mm. The recesses of the
+can, its label and tab and the oil are our own decoration.
 """
 
 from __future__ import annotations
@@ -158,14 +158,14 @@ VISUAL = {
     "bottle_tube": bottle_tube,
 }
 
-#: The wall of the can, and neck, tube and spout of the bottle are cylinders in the URDFs.
+#: The wall of the can, and neck, tube and spout of the bottle are cylinders in the URDFs. Neighbours overlap.
 COLLISION = {
     "can_bottom_convex": lambda: turned_solid([CAN_BOTTOM[0], *CAN_BOTTOM[2:]], 60),
     "can_top_convex": lambda: turned_solid([*CAN_TOP[:2], CAN_TOP[3]], 60),
-    "bottle_foot_convex": lambda: turned_solid(BOTTLE_FOOT, 60),
+    "bottle_foot_convex": lambda: turned_solid([BOTTLE_FOOT[0], *BOTTLE_FOOT[2:], (-0.0915, 0.0460)], 60),
     "bottle_cone_convex": lambda: turned_solid(BOTTLE_CONE, 120),
     "bottle_collar_convex": lambda: turned_solid(BOTTLE_COLLAR, 80),
-    "bottle_tip_convex": lambda: turned_solid(BOTTLE_TIP, 60),
+    "bottle_tip_convex": lambda: turned_solid([(0.0905, BOTTLE_TIP[0][1]), *BOTTLE_TIP], 60),
 }
 
 

@@ -240,15 +240,18 @@ def distal_pad() -> Mesh:
 def touching_pad(finger: str) -> Mesh:
     """Return the rubber of a fingertip that runs through the points where it touches, with the normals there."""
     pad = distal_pad()
-    vertices = pad.vertices.copy()
-    for place, normal in TOUCHES[finger]:
-        height = (vertices - place) @ normal
-        distance = np.linalg.norm(vertices - place, axis=1)
-        aside = np.sqrt(np.maximum(distance**2 - height**2, 0.0))
-        share = np.clip(1.0 - (distance / BLEND) ** 2, 0.0, 1.0) ** 2
-        wanted = (1.0 - share) * height - share * aside**2 / (2.0 * CURVE)
-        vertices += np.outer(wanted - height, normal)
-    return Mesh(vertices, pad.faces)
+    surface = pad.vertices[:-1]  # the last one closes the pad underneath
+    places, normals = (np.array(values) for values in zip(*TOUCHES[finger], strict=True))
+    offsets = surface[:, None] - places
+    heights = np.einsum("vci,ci->vc", offsets, normals)
+    squares = np.maximum((offsets**2).sum(axis=2), 1e-12)
+    # Each point has its way near itself, and none at the other.
+    shares = np.clip(1.0 - squares / BLEND**2, 0.0, 1.0) ** 2 / squares / (1.0 / squares).sum(axis=1, keepdims=True)
+    wanted = (heights**2 - squares) / (2.0 * CURVE)
+    surface = surface + np.einsum("vc,ci->vi", shares * (wanted - heights), normals)
+    for place in places:
+        surface[np.linalg.norm(surface - place, axis=1).argmin()] = place
+    return Mesh(np.vstack([surface, pad.vertices[-1]]), pad.faces)
 
 
 def touching_hull(finger: str) -> Mesh:

@@ -122,7 +122,7 @@ def test_limits_near_x1_are_named(can):
 
 def test_collisions_at_x1_are_named(can):
     assert found(can, "collision at x1").mark == OK
-    thick = can.object.urdf.replace('radius="0.02229"', 'radius="0.04"')
+    thick = can.object.urdf.replace('radius="0.02224"', 'radius="0.04"')
     assert thick != can.object.urdf
     finding = found(replace(can, object=replace(can.object, urdf=thick)), "collision at x1")
     assert finding.mark == NOTE

@@ -481,7 +481,7 @@ def test_what_a_newcomer_gets_by_default_can_be_executed(name):
 
 def test_the_files_requirements_are_the_default():
     problem = ga.load_problem("allegro_cylinder_3")
-    assert [str(r) for r in problem.requirements] == ["force_closure:0.5:0.02", "collision_free:0.002:0"]
+    assert [str(r) for r in problem.requirements] == ["force_closure:0.5:0.02", "collision_free:5e-05:0"]
     result = ga.optimize(problem, radius=0.4)
     assert result.requirements == problem.requirements
     assert 0 < result.accepted.sum() < len(result.accepted)
