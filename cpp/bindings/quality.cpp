@@ -1,5 +1,9 @@
+#include <pybind11/stl.h>
+
+#include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -68,6 +72,36 @@ py::array_t<double> evaluate_closure(GraspSystem& system, const DoubleArray& X, 
     auto own = std::make_shared<OwnMeasure<ForceClosure>>(system, friction, torsional);
     return [own, x, size, measure](std::int64_t row) { return (own->measure.*measure)(x + row * size); };
   });
+}
+
+/// Contact forces of each grasp, of total normal force one, that balance its load; see force_closure.hpp.
+ArrayTable contact_forces(GraspSystem& system, const DoubleArray& X, double friction, double torsional,
+                          const std::optional<DoubleArray>& loads) {
+  const py::ssize_t n = checked_rows(system, X), m = system.contact_count(), a = system.actuated_count();
+  const int size = system.configuration_size(), dof = system.object_dof();
+  if (loads && (loads->ndim() != 2 || loads->shape(0) != n || loads->shape(1) != dof))
+    throw Error("loads must have " + std::to_string(dof) + " columns, one row for each grasp");
+  py::array_t<double> forces(std::vector<py::ssize_t>{n, m, 3}), margins(n);
+  py::array_t<double> torques = matrix<double>(n, m), joint_torques = matrix<double>(n, a);
+  double *f = forces.mutable_data(), *t = torques.mutable_data(), *tau = joint_torques.mutable_data();
+  double* margin = margins.mutable_data();
+  const double *x = X.data(), *load = loads ? loads->data() : nullptr;
+  const auto make = [&](int) {
+    auto own = std::make_shared<OwnMeasure<ForceClosure>>(system, friction, torsional);
+    return [=, found = ForceClosure::Forces()](std::int64_t row) mutable {
+      margin[row] = own->measure.forces(x + row * size, load ? load + row * dof : nullptr, found);
+      std::copy_n(found.forces.data(), 3 * m, f + row * 3 * m);
+      std::copy_n(found.torques.data(), m, t + row * m);
+      std::copy_n(found.joint_torques.data(), a, tau + row * a);
+    };
+  };
+  interruptible([&](const auto& on) { return for_rows(n, make, on); });
+  ArrayTable out;
+  out["forces"] = forces;
+  out["torques"] = torques;
+  out["joint_torques"] = joint_torques;
+  out["margin"] = margins;
+  return out;
 }
 
 /// `measure(hull, points)` for each grasp, the points of which are columns.
@@ -169,6 +203,13 @@ void bind_quality(py::module_& module) {
       py::arg("system"), py::arg("X"), py::arg("friction"), py::arg("torsional") = 0.0,
       "Force-closure margin of each grasp with its sign [n]; -infinity where there are no internal forces. See "
       "force_closure.hpp.");
+  module.def(
+      "contact_forces", &contact_forces, py::arg("system"), py::arg("X"), py::arg("friction"),
+      py::arg("torsional") = 0.0, py::arg("loads") = py::none(),
+      "Contact forces on the object of each grasp that stay farthest from their friction cones: forces [n x m x 3] "
+      "and torques about the normals into the object [n x m], world axes, for a total normal force of one; "
+      "joint_torques of the actuated joints [n x a], and margin [n]. Loads [n x object_dof] are wrenches at the "
+      "object's origin to balance. NaN where the margin is 0. See force_closure.hpp.");
   bind_wrenches(module);
 }
 

@@ -17,6 +17,7 @@ from graspatlas.atlas.status import Closed, Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.execution.approach import Approach
 from graspatlas.execution.pregrasp import Pregrasp
+from graspatlas.execution.contact_forces import ContactForces
 from graspatlas.grasps.grasps import Grasp, Grasps
 from graspatlas.hand import motions
 from graspatlas.hand.body import Body
@@ -65,6 +66,7 @@ __all__ = [
     "CollisionFree",
     "Components",
     "Contact",
+    "ContactForces",
     "FirstGrasp",
     "ForceClosure",
     "Grasp",

@@ -37,6 +37,7 @@ __all__: list[str] = [
     "available_threads",
     "ball_radii",
     "box_half_width",
+    "contact_forces",
     "distances_from_hull",
     "force_closure_margins",
     "force_closure_slacks",
@@ -692,6 +693,17 @@ def box_half_width(
 ) -> float:
     """
     Half the width of the box that the polytopes of charts are cut from.
+    """
+
+def contact_forces(
+    system: GraspSystem,
+    X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    friction: typing.SupportsFloat | typing.SupportsIndex,
+    torsional: typing.SupportsFloat | typing.SupportsIndex = 0.0,
+    loads: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None,
+) -> dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]]:
+    """
+    Contact forces on the object of each grasp that stay farthest from their friction cones: forces [n x m x 3] and torques about the normals into the object [n x m], world axes, for a total normal force of one; joint_torques of the actuated joints [n x a], and margin [n]. Loads [n x object_dof] are wrenches at the object's origin to balance. NaN where the margin is 0. See force_closure.hpp.
     """
 
 def distances_from_hull(

@@ -405,4 +405,17 @@ void GraspSystem::grasp_matrices(const double* x, Eigen::Ref<RowMatrix> J, Eigen
   });
 }
 
+void GraspSystem::normal_spins(const double* x, Eigen::Ref<RowMatrix> out) {
+  out.setZero();
+  Eigen::Index row = 0;
+  visit_contacts(x, true, [&](const Contact& contact, const SideState&, const SideState& object) {
+    const Eigen::Vector3d inward = -(object.rotation * object.local.m);
+    for (int v : model_->support(contact.hand.joint)) {
+      const Eigen::Map<const Eigen::Vector3d> angular(model_->velocity(v) + 3);
+      out.row(row) += inward.dot(angular) * transmission_.row(v);
+    }
+    ++row;
+  });
+}
+
 }  // namespace graspatlas

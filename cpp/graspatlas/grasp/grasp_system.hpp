@@ -101,6 +101,9 @@ class GraspSystem : public System {
   /// object_dof], the grasp matrix transposed: the object's velocity (linear at its origin, then angular; world axes)
   /// to those of the points.
   void grasp_matrices(const double* x, Eigen::Ref<RowMatrix> J, Eigen::Ref<RowMatrix> Gt);
+  /// Velocities of the actuated joints to angular velocities of the fingertips about the contact normals into the
+  /// object [contact_count x actuated_count].
+  void normal_spins(const double* x, Eigen::Ref<RowMatrix> out);
 
  private:
   struct Bound {

@@ -34,15 +34,40 @@ ForceClosure::ForceClosure(GraspSystem& system, double friction, double torsiona
     throw Error("torsional friction must not be negative, got " + to_text(torsional));
   J_.resize(3 * system.contact_count(), system.actuated_count());
   Gt_.resize(3 * system.contact_count(), system.object_dof());
+  spins_.resize(system.contact_count(), system.actuated_count());
   normals_.setZero(force_size_, system.contact_count());
 }
 
-double ForceClosure::margin(const double* x) { return internal_forces(x) ? std::max(widest_margin(false), 0.0) : 0.0; }
+double ForceClosure::margin(const double* x) { return balancing_forces(x) ? std::max(widest_margin(false), 0.0) : 0.0; }
 
-double ForceClosure::slack(const double* x) { return internal_forces(x) ? widest_margin(true) : -HUGE_VAL; }
+double ForceClosure::slack(const double* x) { return balancing_forces(x) ? widest_margin(true) : -HUGE_VAL; }
 
-// Solves [G; n'] f = [0; 1] by a QR factorisation of the transpose; false when G or the whole has lost rank.
-bool ForceClosure::internal_forces(const double* x) {
+double ForceClosure::forces(const double* x, const double* load, Forces& out) {
+  const int contacts = system_.contact_count();
+  out.forces.setConstant(contacts, 3, std::nan(""));
+  out.torques.setConstant(contacts, std::nan(""));
+  out.joint_torques.setConstant(system_.actuated_count(), std::nan(""));
+  const double margin = balancing_forces(x, load) ? widest_margin(false) : 0.0;
+  if (!(margin > 0.0)) return 0.0;
+  particular_.noalias() += basis_ * z_.head(basis_.cols());
+  out.forces.setZero();
+  out.torques.setZero();
+  for (int c = 0; c < contacts; ++c) {
+    const auto f = particular_.segment(static_cast<Eigen::Index>(c) * force_size_, force_size_);
+    out.forces.row(c).head(directions_) = f.head(directions_).transpose();
+    if (force_size_ > directions_) out.torques(c) = (torsional_ / friction_) * f(directions_);
+  }
+  const Eigen::Map<const Vector> stacked(out.forces.data(), out.forces.size());
+  out.joint_torques.noalias() = J_.transpose() * stacked;
+  if (force_size_ > directions_) {
+    system_.normal_spins(x, spins_);
+    out.joint_torques.noalias() += spins_.transpose() * out.torques;
+  }
+  return margin;
+}
+
+// Solves [G; n'] f = [-load; 1] by a QR factorisation of the transpose; false when G or the whole has lost rank.
+bool ForceClosure::balancing_forces(const double* x, const double* load) {
   system_.grasp_matrices(x, J_, Gt_);
   system_.contact_points(x, points_.data());
   const int contacts = system_.contact_count(), dof = system_.object_dof();
@@ -60,16 +85,19 @@ bool ForceClosure::internal_forces(const double* x) {
     equations_.block(c * force_size_, dof, force_size_, 1) = normals_.col(c);
   }
   // Torques in units of the grasp's size, so that one tolerance serves all rows.
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 7, 1> right = Vector::Unit(dof + 1, dof);
   for (int column = 0; column <= dof; ++column) {
     const double norm = equations_.col(column).norm();
     if (!(norm > 0.0)) return false;
-    if (column < dof) equations_.col(column) /= norm;
+    if (column == dof) continue;
+    equations_.col(column) /= norm;
+    if (load) right(column) = -load[column] / norm;
   }
   qr_.compute(equations_);
   const auto& R = qr_.matrixR();
   for (int i = 0; i <= dof; ++i)
     if (!(std::abs(R(i, i)) > kRankTolerance * std::abs(R(0, 0)))) return false;
-  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 7, 1> y = qr_.colsPermutation().transpose() * Vector::Unit(dof + 1, dof);
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 7, 1> y = qr_.colsPermutation().transpose() * right;
   R.topLeftCorner(dof + 1, dof + 1).triangularView<Eigen::Upper>().transpose().solveInPlace(y);
   Q_.setIdentity(forces, forces);
   Q_.applyOnTheLeft(qr_.householderQ());

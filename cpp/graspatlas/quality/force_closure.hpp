@@ -27,6 +27,13 @@ namespace graspatlas {
 /// dimension more; so the margin is that above. A torsional friction gamma of 0 is a hard finger.
 class ForceClosure {
  public:
+  /// Contact forces on the object, and the torques at the actuated joints with which the fingers exert them.
+  struct Forces {
+    RowMatrix forces;      // contacts x 3: world axes
+    Vector torques;        // contacts: of soft fingers, about the normals into the object
+    Vector joint_torques;  // actuated joints; forces where they slide
+  };
+
   /// `friction` is mu > 0, `torsional` is gamma >= 0 [m]; in the plane nothing turns about a normal.
   ForceClosure(GraspSystem& system, double friction, double torsional);
 
@@ -35,6 +42,13 @@ class ForceClosure {
 
   /// The margin at x with its sign; minus infinity when G has lost rank or internal forces cannot press at all.
   double slack(const double* x);
+
+  /// The forces that attain the margin, by which they balance a load: G f + load = 0, normal forces adding up to one.
+  ///
+  /// `load` is a wrench on the object at its origin, world axes [object_dof], or null for none. Returns the margin;
+  /// where that is not positive no forces inside the cones balance the load, and `out` holds NaN. Joint torques are
+  /// those of statics, without the weight of the hand.
+  double forces(const double* x, const double* load, Forces& out);
 
  private:
   using Force = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1>;  // see force_size_
@@ -49,7 +63,7 @@ class ForceClosure {
     double evaluate(const Vector& z, Force& tangent, double& along) const;
   };
 
-  bool internal_forces(const double* x);
+  bool balancing_forces(const double* x, const double* load = nullptr);
   void set_cones();
   double widest_margin(bool signed_margin);
   double barrier(const Vector& z, double weight) const;
@@ -59,10 +73,10 @@ class ForceClosure {
   double friction_, torsional_;
   int directions_;  // of a contact force: three, in the plane two
   int force_size_;  // its components: these, and of soft fingers the torque about the normal times mu / gamma
-  RowMatrix J_, Gt_;
+  RowMatrix J_, Gt_, spins_;
   Matrix normals_;     // force_size x contacts: into the object
   Matrix basis_;       // of the internal forces with no total normal force, one a column
-  Vector particular_;  // internal forces with total normal force one
+  Vector particular_;  // forces with total normal force one that balance the load; without one they are internal
   std::vector<ContactPoint> points_;
 
   // Room to work in, the same for all grasps.

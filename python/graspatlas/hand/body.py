@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TypedDict
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.robot_files import find_file, package_folders
-from graspatlas.hand.urdf import box_urdf, cylinder_urdf, sphere_urdf
+from graspatlas.hand.urdf import box_urdf, center_of_mass, cylinder_urdf, sphere_urdf
 from graspatlas.hand.urdf_checks import check_urdf
+from graspatlas.support.arrays import Array
 from graspatlas.support.files import read_text
 from graspatlas.support.pickling import Light
-from graspatlas.support.validation import PlainTable, StatedTable, checked_table
+from graspatlas.support.validation import PlainTable, StatedTable, checked_table, read_only
 
 __all__ = ["Body"]
 
@@ -60,6 +62,17 @@ class Body(Light):
     def tree(self) -> str:
         """The URDF as Pinocchio is to read it."""
         return self.urdf
+
+    @cached_property
+    def center_of_mass(self) -> Array:
+        """Centre of mass by the ``<inertial>`` of the URDF, in the root link's frame (3,), metres.
+
+        All joints are at 0. It is the origin where no mass is stated, which for the bodies that are made here is right.
+        """
+        try:
+            return read_only(center_of_mass(self.urdf))
+        except ValueError as error:
+            raise GraspAtlasError(f"the <inertial> of '{self.name}' holds what is not a number: {error}") from None
 
     @classmethod
     def _read(

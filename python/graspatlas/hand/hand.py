@@ -14,6 +14,7 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.body import Body
 from graspatlas.hand.mechanism import Mechanism
 from graspatlas.hand.urdf import (
+    effort_limits,
     joint_limits,
     joints_of_kind,
     lock_joints,
@@ -195,6 +196,15 @@ class Hand(Body):
         """Lower and upper limit of each joint [rad or m]."""
         lower, upper = self.joint_limits
         return {j.name: (float(lower[j.q_index]), float(upper[j.q_index])) for j in self.model.hand_joints}
+
+    @property
+    def efforts_by_name(self) -> dict[str, float]:
+        """Largest torque or force of the joints that state one, ``<limit effort>`` in the URDF [N m or N].
+
+        An effort of 0 counts as not stated. Of joints that mimic others that of the driver is the one that matters.
+        """
+        efforts = effort_limits(self.urdf)
+        return {name: efforts[name] for name in self.joints if name in efforts}
 
     @property
     def binding_limits(self) -> tuple[Array, Array]:

@@ -15,8 +15,10 @@ from graspatlas.support.arrays import Array
 
 __all__ = [
     "box_urdf",
+    "center_of_mass",
     "cylinder_urdf",
     "fixed_parents",
+    "effort_limits",
     "joint_limits",
     "joints_of_kind",
     "lock_joints",
@@ -81,6 +83,71 @@ def velocity_limits(urdf: str) -> dict[str, float]:
         if velocity > 0.0:
             limits[str(joint.get("name"))] = velocity
     return limits
+
+
+def effort_limits(urdf: str) -> dict[str, float]:
+    """Effort limits of the joints of a URDF that state a positive, finite one [N m or N], by name.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    limits = {}
+    for joint in _joints(ElementTree.fromstring(urdf)):
+        limit = joint.find("limit")
+        effort = 0.0 if limit is None or joint.get("type") not in TURNING + SLIDING else _effort(limit)
+        if 0.0 < effort < np.inf:
+            limits[str(joint.get("name"))] = effort
+    return limits
+
+
+def _effort(limit: ElementTree.Element) -> float:
+    """The effort of a ``<limit>``; 0 where it is none, as that of a continuous joint may be, which nobody checks."""
+    try:
+        return float(limit.get("effort", "0"))
+    except ValueError:
+        return 0.0
+
+
+def center_of_mass(urdf: str) -> Array:
+    """Centre of mass of a URDF with all joints at 0, in the frame of its root link (3,), metres.
+
+    Args:
+        urdf: Text of a URDF; links without a positive mass weigh nothing, and without any the centre is the origin.
+    """
+    root = ElementTree.fromstring(urdf)
+    placed = {root_link(urdf): (Rotation.identity(), np.zeros(3))}
+    joints = root.findall("joint")
+    for _ in joints:
+        for joint in joints:
+            parent, child = (_link_of(joint, side) for side in ("parent", "child"))
+            if parent in placed and child not in placed:
+                rotation, at = placed[parent]
+                turned, moved = _origin(joint)
+                placed[child] = rotation * turned, at + rotation.apply(moved)
+    moment, total = np.zeros(3), 0.0
+    for link in root.findall("link"):
+        inertial, mass = link.find("inertial"), link.find("inertial/mass")
+        weight = 0.0 if mass is None else float(mass.get("value", "0"))
+        if inertial is None or not weight > 0.0 or str(link.get("name")) not in placed:
+            continue
+        rotation, at = placed[str(link.get("name"))]
+        moment, total = moment + weight * (at + rotation.apply(_origin(inertial)[1])), total + weight
+    return np.asarray(moment / total) if total > 0.0 else moment
+
+
+def _link_of(joint: ElementTree.Element, side: str) -> str:
+    """Name of the parent or child link of a joint."""
+    element = joint.find(side)
+    return "" if element is None else str(element.get("link"))
+
+
+def _origin(element: ElementTree.Element) -> tuple[Rotation, Array]:
+    """Rotation and translation [m] of the ``<origin>`` of a joint or inertial."""
+    origin = element.find("origin")
+    if origin is None:
+        return Rotation.identity(), np.zeros(3)
+    rotation = Rotation.from_euler("xyz", _triple(origin.get("rpy"), (0, 0, 0)))
+    return rotation, _triple(origin.get("xyz"), (0, 0, 0))
 
 
 def root_link(urdf: str) -> str:
