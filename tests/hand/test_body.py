@@ -42,7 +42,8 @@ def test_the_centre_of_mass_is_that_of_all_links():
         '<robot name="two"><link name="a"><inertial><origin xyz="0 0 0.4"/><mass value="1"/></inertial></link>'
         '<link name="b"><inertial><origin xyz="0.2 0 0"/><mass value="3"/></inertial></link><link name="c"/>'
         '<joint name="ab" type="fixed"><parent link="a"/><child link="b"/>'
-        '<origin xyz="0.1 0 0" rpy="0 0 1.5707963267948966"/></joint><joint name="bc" type="fixed"><parent link="b"/><child link="c"/></joint></robot>'
+        '<origin xyz="0.1 0 0" rpy="0 0 1.5707963267948966"/></joint>'
+        '<joint name="bc" type="fixed"><parent link="b"/><child link="c"/></joint></robot>'
     )
     np.testing.assert_allclose(ga.Body("two", urdf).center_of_mass, [0.075, 0.15, 0.1], atol=1e-12)
     assert not ga.Body.box("box", (0.1, 0.2, 0.3)).center_of_mass.any()
