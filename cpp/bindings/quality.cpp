@@ -1,3 +1,4 @@
+#include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include "graspatlas/errors.hpp"
 #include "graspatlas/quality/batch.hpp"
 #include "graspatlas/quality/force_closure.hpp"
+#include "graspatlas/quality/holding_force.hpp"
 #include "graspatlas/quality/manipulability.hpp"
 #include "graspatlas/quality/min_weight.hpp"
 #include "graspatlas/quality/wrench_hull.hpp"
@@ -167,6 +169,44 @@ void bind_wrenches(py::module_& module) {
       "Min-weight metric, between 0 and 1, of each grasp's wrenches [n x points x 3 or 6]; see min_weight.hpp.");
 }
 
+void bind_holding_force(py::module_& module) {
+  py::class_<HoldingLimits>(module, "HoldingLimits", "What holds an object; see holding_force.hpp.")
+      .def(py::init([](double friction, double torsional, double normal_force, const Vector& efforts,
+                       const Eigen::Vector3d& center_of_mass, double torque_length, double gap) {
+             return HoldingLimits{friction, torsional, normal_force, efforts, center_of_mass, torque_length, gap};
+           }),
+           py::arg("friction"), py::arg("torsional"), py::arg("normal_force"), py::arg("efforts"),
+           py::arg("center_of_mass"), py::arg("torque_length"), py::arg("gap"));
+  module.def(
+      "holding_forces",
+      [](GraspSystem& system, const DoubleArray& X, const HoldingLimits& limits) {
+        const double* x = X.data();
+        const int size = system.configuration_size();
+        return numbers_of_rows(checked_rows(system, X), [&system, &limits, x, size](int) {
+          auto own = std::make_shared<OwnMeasure<HoldingForce>>(system, limits);
+          return [own, x, size](std::int64_t row) { return own->measure.largest(x + row * size); };
+        });
+      },
+      py::arg("system"), py::arg("X"), py::arg("limits"),
+      "Largest disturbance from whatever side that each grasp withstands [n], newtons; see holding_force.hpp.");
+  module.def(
+      "resisted_loads",
+      [](GraspSystem& system, const DoubleArray& X, const DoubleArray& directions, const HoldingLimits& limits) {
+        const py::ssize_t n = checked_rows(system, X), axes = system.object_joint().space_dimension();
+        if (directions.ndim() != 2 || directions.shape(0) != n || directions.shape(1) != axes)
+          throw Error("directions must have " + std::to_string(axes) + " columns, one row for each grasp");
+        const double *x = X.data(), *d = directions.data();
+        const int size = system.configuration_size();
+        return numbers_of_rows(n, [&system, &limits, x, d, axes, size](int) {
+          auto own = std::make_shared<OwnMeasure<HoldingForce>>(system, limits);
+          return
+              [own, x, d, axes, size](std::int64_t row) { return own->measure.along(x + row * size, d + row * axes); };
+        });
+      },
+      py::arg("system"), py::arg("X"), py::arg("directions"), py::arg("limits"),
+      "Largest force along unit vectors in the object's frame [n x 3, in the plane 2] that each grasp withstands [n].");
+}
+
 }  // namespace
 
 void bind_quality(py::module_& module) {
@@ -211,6 +251,7 @@ void bind_quality(py::module_& module) {
       "joint_torques of the actuated joints [n x a], and margin [n]. Loads [n x object_dof] are wrenches at the "
       "object's origin to balance. NaN where the margin is 0. See force_closure.hpp.");
   bind_wrenches(module);
+  bind_holding_force(module);
 }
 
 }  // namespace graspatlas

@@ -35,6 +35,7 @@ from graspatlas.problems import bundled_problems, load_problem
 from graspatlas.quality.batched import batched
 from graspatlas.requirements.collision_free import CollisionFree
 from graspatlas.requirements.force_closure import ForceClosure
+from graspatlas.requirements.holding_force import HoldingForce
 from graspatlas.requirements.joint_margin import JointMargin
 from graspatlas.result.refinement import Refinement
 from graspatlas.result.result import Result, load_result
@@ -75,6 +76,7 @@ __all__ = [
     "Grasps",
     "Hand",
     "HandMotions",
+    "HoldingForce",
     "JointMargin",
     "Path",
     "Peak",

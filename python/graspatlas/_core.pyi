@@ -21,6 +21,7 @@ __all__: list[str] = [
     "FlippedPatch",
     "GraspAtlasError",
     "GraspSystem",
+    "HoldingLimits",
     "JointInfo",
     "Model",
     "Neighbours",
@@ -41,10 +42,12 @@ __all__: list[str] = [
     "distances_from_hull",
     "force_closure_margins",
     "force_closure_slacks",
+    "holding_forces",
     "hull_volumes",
     "min_weights",
     "project",
     "read_collision_shapes",
+    "resisted_loads",
     "round_ball_radii",
     "semi_axes",
 ]
@@ -624,6 +627,21 @@ class GraspSystem(AnySystem):
         Degrees of freedom of the object.
         """
 
+class HoldingLimits:
+    """
+    What holds an object; see holding_force.hpp.
+    """
+    def __init__(
+        self,
+        friction: typing.SupportsFloat | typing.SupportsIndex,
+        torsional: typing.SupportsFloat | typing.SupportsIndex,
+        normal_force: typing.SupportsFloat | typing.SupportsIndex,
+        efforts: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        center_of_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+        torque_length: typing.SupportsFloat | typing.SupportsIndex,
+        gap: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+
 class CollisionBatch:
     """
     Collision shapes of hand and object; safe to call from any number of threads.
@@ -734,6 +752,13 @@ def force_closure_slacks(
     Force-closure margin of each grasp with its sign [n]; -infinity where there are no internal forces. See force_closure.hpp.
     """
 
+def holding_forces(
+    system: GraspSystem, X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], limits: HoldingLimits
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Largest disturbance from whatever side that each grasp withstands [n], newtons; see holding_force.hpp.
+    """
+
 def hull_volumes(
     wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
 ) -> numpy.typing.NDArray[numpy.float64]:
@@ -763,6 +788,16 @@ def read_collision_shapes(
 ) -> list[dict[str, typing.Any]]:
     """
     Collision shapes of a URDF, each a table; see collision_shape.hpp.
+    """
+
+def resisted_loads(
+    system: GraspSystem,
+    X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    directions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    limits: HoldingLimits,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Largest force along unit vectors in the object's frame [n x 3, in the plane 2] that each grasp withstands [n].
     """
 
 def round_ball_radii(

@@ -38,16 +38,28 @@ ForceClosure::ForceClosure(GraspSystem& system, double friction, double torsiona
   normals_.setZero(force_size_, system.contact_count());
 }
 
-double ForceClosure::margin(const double* x) { return balancing_forces(x) ? std::max(widest_margin(false), 0.0) : 0.0; }
+double ForceClosure::margin(const double* x) {
+  return balancing_forces(x) ? std::max(widest_margin(Aim::margin), 0.0) : 0.0;
+}
 
-double ForceClosure::slack(const double* x) { return balancing_forces(x) ? widest_margin(true) : -HUGE_VAL; }
+double ForceClosure::slack(const double* x) {
+  return balancing_forces(x) ? widest_margin(Aim::signed_margin) : -HUGE_VAL;
+}
 
 double ForceClosure::forces(const double* x, const double* load, Forces& out) {
+  return write_forces(x, balancing_forces(x, load) ? widest_margin(Aim::margin) : 0.0, out);
+}
+
+bool ForceClosure::closes(const double* x, Forces& out) {
+  return write_forces(x, balancing_forces(x) ? widest_margin(Aim::inside) : 0.0, out) > 0.0;
+}
+
+// The forces of the last z_, or NaN where their margin is not positive; returns the margin, or 0.
+double ForceClosure::write_forces(const double* x, double margin, Forces& out) {
   const int contacts = system_.contact_count();
   out.forces.setConstant(contacts, 3, std::nan(""));
   out.torques.setConstant(contacts, std::nan(""));
   out.joint_torques.setConstant(system_.actuated_count(), std::nan(""));
-  const double margin = balancing_forces(x, load) ? widest_margin(false) : 0.0;
   if (!(margin > 0.0)) return 0.0;
   particular_.noalias() += basis_ * z_.head(basis_.cols());
   out.forces.setZero();
@@ -132,7 +144,7 @@ void ForceClosure::set_cones() {
   z_(unknowns - 1) = outside + kStartMargin;
 }
 
-double ForceClosure::widest_margin(bool signed_margin) {
+double ForceClosure::widest_margin(Aim aim) {
   set_cones();
   const Eigen::Index t = z_.size() - 1;
   const double parameter = 2.0 * static_cast<double>(cones_.size());
@@ -140,7 +152,8 @@ double ForceClosure::widest_margin(bool signed_margin) {
   for (double weight = parameter; parameter / weight > kGap && steps < kMaxNewtonSteps; weight *= kGrowth) {
     while (steps < kMaxNewtonSteps && newton_step(weight)) ++steps;
     // The optimum is at most parameter / weight above: outside the cones for good, or known well enough.
-    if (!signed_margin && z_(t) + parameter / weight < 0.0) break;
+    if (aim != Aim::signed_margin && z_(t) + parameter / weight < 0.0) break;
+    if (aim == Aim::inside && z_(t) > 0.0) break;
   }
   return z_(t);
 }

@@ -50,7 +50,15 @@ class ForceClosure {
   /// those of statics, without the weight of the hand.
   double forces(const double* x, const double* load, Forces& out);
 
+  /// Some internal forces strictly inside the cones, normal forces adding up to one; false without force closure. It
+  /// stops as soon as it has them. What follows is of the grasp asked for last.
+  bool closes(const double* x, Forces& out);
+
+  const RowMatrix& J() const { return J_; }  ///< [3 contacts x actuated joints]
+  const std::vector<ContactPoint>& points() const { return points_; }
+
  private:
+  enum class Aim { signed_margin, margin, inside };
   using Force = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1>;  // see force_size_
 
   /// |tangential z + tangential_0| <= axial . z + axial_0: a cone as a function of the unknowns z = (c, t).
@@ -65,7 +73,8 @@ class ForceClosure {
 
   bool balancing_forces(const double* x, const double* load = nullptr);
   void set_cones();
-  double widest_margin(bool signed_margin);
+  double widest_margin(Aim aim);
+  double write_forces(const double* x, double margin, Forces& out);
   double barrier(const Vector& z, double weight) const;
   bool newton_step(double weight);
 

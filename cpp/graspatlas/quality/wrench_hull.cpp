@@ -12,6 +12,7 @@ constexpr double kFlat = 1e-11;          // distance from a plane that is roundi
 constexpr double kRankTolerance = 1e-9;  // thickness of a simplex that is none, relative to its size
 constexpr double kRoundGap = 1e-4;       // to which the ball in round cones is found, relative to its radius
 constexpr std::size_t kMaxRoundFacets = 300000;
+constexpr std::size_t kMaxReachFacets = 20000;
 constexpr int kCornerBits = 12;  // of a corner's number: five of them make the key of a ridge
 
 }  // namespace
@@ -158,6 +159,26 @@ double WrenchHull<D>::ball_radius(const Eigen::Ref<const Points>& axes, double f
   });
 }
 
+template <int D>
+double WrenchHull<D>::ball_radius(const Eigen::Ref<const Points>& points, double least, double relative_gap,
+                                  const Reach& reach) {
+  if (!start(points)) return 0.0;
+  for (int i = 0; i < count_; ++i) add(i);
+  for (;;) {
+    const Facet nearest = *std::min_element(facets_.begin(), facets_.end(),
+                                            [](const Facet& a, const Facet& b) { return a.distance < b.distance; });
+    const double radius = std::max(nearest.distance, 0.0);
+    if (least - radius <= relative_gap * least || facets_.size() > kMaxReachFacets || count_ > kMaxPoints)
+      return radius;
+    Point furthest;
+    least = std::min(least, reach(nearest.normal, nearest.corners, least, furthest));
+    if (nearest.normal.dot(furthest) - nearest.distance <= flat_) return radius;
+    if (points_.cols() == count_) points_.conservativeResize(D, 2 * count_);
+    points_.col(count_) = furthest + origin_;
+    add(count_++);
+  }
+}
+
 // The sum over the facets of the simplices with the centre, each with its sign: a fold cancels itself.
 template <int D>
 double WrenchHull<D>::volume(const Eigen::Ref<const Points>& points) {
@@ -173,6 +194,7 @@ double WrenchHull<D>::volume(const Eigen::Ref<const Points>& points) {
   return std::abs(sum);
 }
 
+template class WrenchHull<2>;
 template class WrenchHull<3>;
 template class WrenchHull<6>;
 

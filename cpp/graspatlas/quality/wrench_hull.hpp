@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 namespace graspatlas {
@@ -22,6 +23,12 @@ class WrenchHull {
  public:
   using Point = Eigen::Matrix<double, D, 1>;
   using Points = Eigen::Matrix<double, D, Eigen::Dynamic>;
+  using Corners = std::array<std::uint16_t, D>;
+
+  /// A convex body that is asked how far it reaches in a direction, a facet's normal. It writes a point of its own that
+  /// is about as far, numbered one more than the last, and returns a bound of how far any is. The facet's corners are
+  /// the points of these numbers; what is further away than `least` need not be known better.
+  using Reach = std::function<double(const Point& direction, const Corners& corners, double least, Point& furthest)>;
 
   static constexpr int kMaxPoints = 4095;
   static constexpr int kRoundCorners = 8;  // of each disc, with which the hull of round cones starts
@@ -39,11 +46,16 @@ class WrenchHull {
   /// to what 300,000 facets give.
   double ball_radius(const Eigen::Ref<const Points>& axes, double friction);
 
+  /// The same for a convex body, from some of its points, one of its reaches as `least`, and its reach in directions.
+  ///
+  /// The radius is that of a ball in the hull of points of the body, a lower bound; an upper one is the least reach. It
+  /// ends when these are within `relative_gap`, or with the lower bound there is after the most points or facets.
+  double ball_radius(const Eigen::Ref<const Points>& points, double least, double relative_gap, const Reach& reach);
+
   /// Volume of the hull of the points; zero when they lie in one plane.
   double volume(const Eigen::Ref<const Points>& points);
 
  private:
-  using Corners = std::array<std::uint16_t, D>;
   struct Facet {
     Point normal;     // outward unit normal
     double offset;    // of its plane from the centre
@@ -70,6 +82,7 @@ class WrenchHull {
   std::vector<Ridge> rim_;
 };
 
+extern template class WrenchHull<2>;
 extern template class WrenchHull<3>;
 extern template class WrenchHull<6>;
 

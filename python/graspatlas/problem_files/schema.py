@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, Field, create_model, model_validator
 
 import graspatlas.requirements.collision_free
 import graspatlas.requirements.force_closure
+import graspatlas.requirements.holding_force
 import graspatlas.requirements.joint_margin  # noqa: F401
 from graspatlas.patches.base import Patch
 from graspatlas.patches.registry import patch_types

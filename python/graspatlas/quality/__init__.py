@@ -8,6 +8,7 @@ one of your own is said in :mod:`graspatlas.quality.batched`.
 from graspatlas.quality.batched import Quality, batched, quality_name
 from graspatlas.quality.evaluation import INDICES, evaluate
 from graspatlas.quality.force_closure import force_closure_margin, force_closure_slack
+from graspatlas.quality.holding_force import holding_force, resisted_load
 from graspatlas.quality.manipulability import (
     inverse_condition_number,
     joint_centrality,
@@ -32,11 +33,13 @@ __all__ = [
     "force_closure_margin",
     "force_closure_slack",
     "grasp_isotropy",
+    "holding_force",
     "inverse_condition_number",
     "joint_centrality",
     "manipulability_volume",
     "min_weight",
     "quality_name",
+    "resisted_load",
     "smallest_semi_axis",
     "soft_finger_epsilon",
 ]

@@ -11,6 +11,7 @@ from graspatlas.grasps.callables import GraspFunction, called_numbers
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.quality.force_closure import force_closure_margin
+from graspatlas.quality.holding_force import holding_force
 from graspatlas.quality.manipulability import (
     inverse_condition_number,
     joint_centrality,
@@ -42,6 +43,7 @@ INDICES: dict[str, Callable[[Grasps], Array]] = {
         min_weight,
         grasp_isotropy,
         joint_centrality,
+        holding_force,
     )
 }
 #: Indices of this package, whose values need no check.

@@ -4,6 +4,7 @@ from graspatlas.problem.requirement import REQUIREMENTS, parse_requirement, requ
 from graspatlas.requirements.base import Requirement, RequirementLike, requirement_name
 from graspatlas.requirements.collision_free import CollisionFree
 from graspatlas.requirements.force_closure import ForceClosure
+from graspatlas.requirements.holding_force import HoldingForce
 from graspatlas.requirements.joint_margin import JointMargin
 from graspatlas.requirements.screening import check_requirements, screen
 
@@ -14,6 +15,7 @@ __all__ = [
     "REQUIREMENTS",
     "CollisionFree",
     "ForceClosure",
+    "HoldingForce",
     "JointMargin",
     "Require",
     "Requirement",

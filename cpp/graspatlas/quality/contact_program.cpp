@@ -1,0 +1,273 @@
+#include "graspatlas/quality/contact_program.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+namespace graspatlas {
+
+namespace {
+
+constexpr int kMaxSteps = 120;             // Newton steps of one maximum
+constexpr double kDual = 0.9;              // squared Newton decrement below which there is a dual point
+constexpr double kShort = 0.09;            // of a step that needs no search
+constexpr double kCentred = 0.25;          // of a point that is the centre
+constexpr double kLong = 60.0;             // of steps along the path
+constexpr double kFar = 2.5;               // of points so far from the path that they go back to it first ...
+constexpr double kBack = 0.6;              // ... where its weight is so many times the weight of the nearest point
+constexpr double kNearly = 0.9;            // of the way to the boundary that a step goes at most
+constexpr int kSearches = 6;               // of a line, by Newton's method
+constexpr double kFlatEnough = 0.2;        // of the slope that may be left of it
+constexpr double kSmallestPivot = 1e-300;  // of a Hessian
+
+// a2 t^2 + 2 a1 t + a0 with a0 > 0: where it first vanishes for t > 0; infinity when it does not.
+double first_root(double a2, double a1, double a0) {
+  const double discriminant = a1 * a1 - a2 * a0;
+  if (discriminant < 0.0 || (a1 >= 0.0 && a2 >= 0.0)) return HUGE_VAL;
+  const double root = a0 / (-a1 + std::sqrt(discriminant));
+  return root > 0.0 ? root : HUGE_VAL;
+}
+
+// work(N) with n as a constant N, for the sizes of grasps by three or four fingers; else with Eigen::Dynamic.
+template <class Work>
+auto with_size(Eigen::Index n, const Work& work) {
+  switch (n) {
+    case 5:
+      return work(std::integral_constant<int, 5>());
+    case 6:
+      return work(std::integral_constant<int, 6>());
+    case 9:
+      return work(std::integral_constant<int, 9>());
+    case 13:
+      return work(std::integral_constant<int, 13>());
+    default:
+      return work(std::integral_constant<int, Eigen::Dynamic>());
+  }
+}
+
+template <int N>
+using Square = Eigen::Map<Eigen::Matrix<double, N, N, Eigen::RowMajor>>;
+template <int N>
+using Column = Eigen::Map<Eigen::Matrix<double, N, 1>>;
+template <int N>
+using ConstRow = Eigen::Map<const Eigen::Matrix<double, N, 1>>;
+
+}  // namespace
+
+void ContactProgram::set(const RowMatrix& rows, int cone_size, const RowMatrix& limits, double budget) {
+  rows_ = rows;
+  limits_ = limits;
+  cone_size_ = cone_size;
+  contacts_ = static_cast<int>(rows.rows()) / cone_size;
+  const Eigen::Index n = rows.cols();
+  parameter_ = 2.0 * contacts_ + 1.0 + 2.0 * static_cast<double>(limits.rows());
+  budget_row_.setZero(n);
+  curvatures_.resize(contacts_, n * n);
+  for (int i = 0; i < contacts_; ++i) {
+    Eigen::Map<RowMatrix> C(curvatures_.row(i).data(), n, n);
+    const auto along = rows_.row(static_cast<Eigen::Index>(i) * cone_size);
+    budget_row_ += along.transpose() / budget;
+    C.noalias() = -along.transpose() * along;
+    for (int k = 1; k < cone_size; ++k) {
+      const auto side = rows_.row(static_cast<Eigen::Index>(i) * cone_size + k);
+      C.noalias() += side.transpose() * side;
+    }
+  }
+  steps_ = 0;
+}
+
+bool ContactProgram::start(const Vector& y) {
+  y_ = y;
+  return inside() > 0.0;
+}
+
+// The least of what is left to any constraint at y_; not positive outside.
+double ContactProgram::inside() const {
+  double least = 1.0 - budget_row_.dot(y_);
+  for (int i = 0; i < contacts_; ++i) {
+    const Eigen::Index at = static_cast<Eigen::Index>(i) * cone_size_;
+    const double along = rows_.row(at).dot(y_);
+    double side = 0.0;
+    for (int k = 1; k < cone_size_; ++k) side += std::pow(rows_.row(at + k).dot(y_), 2);
+    least = std::min(least, along - std::sqrt(side));
+  }
+  for (Eigen::Index j = 0; j < limits_.rows(); ++j) least = std::min(least, 1.0 - std::abs(limits_.row(j).dot(y_)));
+  return least;
+}
+
+// Gradient and Hessian of the barrier -sum log(z_0^2 - |z_side|^2) - log(1 - sum z_0) - sum log(1 - v^2) at y_, and the
+// Hessian's Cholesky factor.
+void ContactProgram::linearize() {
+  const Eigen::Index n = y_.size();
+  z_.resize(rows_.rows());
+  v_.resize(limits_.rows());
+  gradient_.resize(n);
+  hessian_.resize(n, n);
+  factor_.resize(n, n);
+  with_size(n, [this](auto size) {
+    linearize_sized<size>();
+    factorize_sized<size>();
+  });
+}
+
+template <int N>
+void ContactProgram::linearize_sized() {
+  const Eigen::Index n = y_.size();
+  const auto row = [n](const RowMatrix& A, Eigen::Index i) { return ConstRow<N>(A.data() + i * n, n); };
+  const ConstRow<N> y(y_.data(), n), budget(budget_row_.data(), n);
+  Column<N> gradient(gradient_.data(), n);
+  Square<N> hessian(hessian_.data(), n, n);
+  for (Eigen::Index i = 0; i < z_.size(); ++i) z_(i) = row(rows_, i).dot(y);
+  budget_left_ = 1.0 - budget.dot(y);
+  gradient = budget / budget_left_;
+  hessian.noalias() = gradient * gradient.transpose();
+  Eigen::Matrix<double, N, 1> normal(n);
+  for (int i = 0; i < contacts_; ++i) {
+    const Eigen::Index at = static_cast<Eigen::Index>(i) * cone_size_;
+    double s = z_(at) * z_(at);
+    for (int k = 1; k < cone_size_; ++k) s -= z_(at + k) * z_(at + k);
+    const double weight = 2.0 / s;
+    normal = (-weight * z_(at)) * row(rows_, at);
+    for (int k = 1; k < cone_size_; ++k) normal += (weight * z_(at + k)) * row(rows_, at + k);
+    gradient += normal;
+    hessian += weight * Eigen::Map<const Eigen::Matrix<double, N, N, Eigen::RowMajor>>(curvatures_.row(i).data(), n, n);
+    hessian.noalias() += normal * normal.transpose();
+  }
+  for (Eigen::Index j = 0; j < limits_.rows(); ++j) {
+    const auto limit = row(limits_, j);
+    v_(j) = limit.dot(y);
+    const double left = 1.0 / (1.0 - v_(j) * v_(j)), slope = 2.0 * v_(j) * left;
+    gradient += slope * limit;
+    normal = (2.0 * left + slope * slope) * limit;
+    hessian.noalias() += normal * limit.transpose();
+  }
+}
+
+// Row by row; the inverses of the diagonal stand in it.
+template <int N>
+void ContactProgram::factorize_sized() {
+  const Eigen::Index n = N == Eigen::Dynamic ? y_.size() : N;
+  Square<N> L(factor_.data(), n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      double sum = hessian_.data()[i * n + j];
+      for (Eigen::Index k = 0; k < j; ++k) sum -= L(i, k) * L(j, k);
+      L(i, j) = i == j ? 1.0 / std::sqrt(std::max(sum, kSmallestPivot)) : sum * L(j, j);
+    }
+  }
+}
+
+void ContactProgram::solve(const Vector& right, Vector& out) {
+  out = right;
+  with_size(out.size(), [&](auto size) {
+    const Eigen::Index n = size == Eigen::Dynamic ? out.size() : Eigen::Index{size};
+    const Square<size> L(factor_.data(), n, n);
+    double* const x = out.data();
+    for (Eigen::Index i = 0; i < n; ++i) {
+      for (Eigen::Index k = 0; k < i; ++k) x[i] -= L(i, k) * x[k];
+      x[i] *= L(i, i);
+    }
+    for (Eigen::Index i = n - 1; i >= 0; --i) {
+      x[i] *= L(i, i);
+      for (Eigen::Index k = 0; k < i; ++k) x[k] -= L(i, k) * x[i];
+    }
+  });
+}
+
+// How far to go along step_, towards the least of the barrier less slope t: `slope` is the weight times c . step_.
+double ContactProgram::line_search(double slope) {
+  dz_.noalias() = rows_.lazyProduct(step_);
+  const double budget_step = budget_row_.dot(step_);
+  double end = budget_step > 0.0 ? budget_left_ / budget_step : HUGE_VAL;
+  const auto quadratic = [&](int i, double& a0, double& a1, double& a2) {
+    const Eigen::Index at = static_cast<Eigen::Index>(i) * cone_size_;
+    a0 = z_(at) * z_(at), a1 = z_(at) * dz_(at), a2 = dz_(at) * dz_(at);
+    for (Eigen::Index k = at + 1; k < at + cone_size_; ++k) {
+      a0 -= z_(k) * z_(k), a1 -= z_(k) * dz_(k), a2 -= dz_(k) * dz_(k);
+    }
+  };
+  double a0, a1, a2;
+  for (int i = 0; i < contacts_; ++i) {
+    quadratic(i, a0, a1, a2);
+    end = std::min(end, first_root(a2, a1, a0));
+  }
+  if (limits_.rows() > 0) dv_.noalias() = limits_.lazyProduct(step_);
+  for (Eigen::Index j = 0; j < limits_.rows(); ++j)
+    if (dv_(j) != 0.0) end = std::min(end, ((dv_(j) > 0.0 ? 1.0 : -1.0) - v_(j)) / dv_(j));
+  double low = 0.0, high = end, t = std::min(1.0, kNearly * end);
+  const double first_slope = slope + step_.dot(-gradient_);
+  for (int search = 0; search < kSearches; ++search) {
+    double first = slope - budget_step / (budget_left_ - t * budget_step);
+    double second = std::pow(budget_step / (budget_left_ - t * budget_step), 2);
+    for (int i = 0; i < contacts_; ++i) {
+      quadratic(i, a0, a1, a2);
+      const double s = 1.0 / (a0 + t * (2.0 * a1 + t * a2)), rate = 2.0 * (a1 + t * a2) * s;
+      first += rate;
+      second += rate * rate - 2.0 * a2 * s;
+    }
+    for (Eigen::Index j = 0; j < limits_.rows(); ++j) {
+      const double v = v_(j) + t * dv_(j), left = 1.0 / (1.0 - v * v), rate = 2.0 * v * dv_(j) * left;
+      first -= rate;
+      second += rate * rate + 2.0 * dv_(j) * dv_(j) * left;
+    }
+    if (std::abs(first) <= kFlatEnough * first_slope) break;
+    (first > 0.0 ? low : high) = t;
+    double next = second > 0.0 ? t + first / second : HUGE_VAL;
+    if (!(next > low && next < high)) next = std::isfinite(high) ? 0.5 * (low + high) : 2.0 * t;
+    t = next;
+  }
+  return std::min(t, std::isfinite(end) ? 0.999 * end : t);
+}
+
+// With the Newton step w H^-1 c - H^-1 g for the weight w its squared decrement is a w^2 - 2 b w + d. Each step takes
+// the largest weight at which that is no more than kLong; and any weight at which it is below one gives a dual point,
+// the objective of which is b + (parameter - d) / w above c . y.
+ContactProgram::Bounds ContactProgram::maximize(const Vector& c, double relative_gap, double enough) {
+  Bounds bounds{c.dot(y_), HUGE_VAL};
+  for (int steps = 0; steps < kMaxSteps; ++steps) {
+    linearize();
+    solve(c, along_);
+    solve(gradient_, center_);
+    const double a = c.dot(along_), b = gradient_.dot(along_), d = gradient_.dot(center_);
+    const double best = b / a, nearest = d - b * best;  // the weight of the shortest step, and its squared decrement
+    if (!std::isfinite(nearest) || !(a > 0.0)) break;
+    const double reach = nearest < kDual ? std::sqrt((kDual - nearest) / a) : 0.0;
+    const double weight = d < parameter_ ? best + reach : best - reach;
+    if (nearest < kDual && weight > 0.0)
+      bounds.upper = std::min(bounds.upper, bounds.lower + b + (parameter_ - d) / weight);
+    if (bounds.lower >= (1.0 - relative_gap) * bounds.upper || bounds.lower >= enough) break;
+    const double most = 2.0 * parameter_ / (relative_gap * std::max(bounds.lower, std::sqrt(a)));
+    const double next = nearest < kFar ? std::min(best + std::sqrt((kLong - nearest) / a), most) : kBack * best;
+    step_ = std::max(next, 0.0) * along_ - center_;
+    ++steps_;
+    const double decrement = next * (a * next - 2.0 * b) + d;
+    y_ += (decrement < kShort ? 1.0 : line_search(next * c.dot(step_))) * step_;
+    bounds.lower = c.dot(y_);
+  }
+  return bounds;
+}
+
+void ContactProgram::center() {
+  for (int steps = 0; steps < kMaxSteps; ++steps) {
+    linearize();
+    solve(gradient_, center_);
+    step_ = -center_;
+    const double decrement = gradient_.dot(center_);
+    if (!(decrement > kCentred)) return;
+    ++steps_;
+    y_ += (decrement < kShort ? 1.0 : line_search(0.0)) * step_;
+  }
+}
+
+Matrix ContactProgram::dikin_shape(const RowMatrix& E) {
+  linearize();
+  Matrix solved(E.cols(), E.rows());
+  for (Eigen::Index i = 0; i < E.rows(); ++i) {
+    normal_ = E.row(i).transpose();
+    solve(normal_, step_);
+    solved.col(i) = step_;
+  }
+  return E * solved;
+}
+
+}  // namespace graspatlas

@@ -1,0 +1,181 @@
+#include "graspatlas/quality/holding_force.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "graspatlas/errors.hpp"
+
+namespace graspatlas {
+
+namespace {
+
+constexpr double kProgramShare = 0.2;  // of the gap, that of each reach
+constexpr double kLoadGap = 1e-6;      // relative, of the force along one direction
+constexpr double kStartShare = 0.5;    // of the budget and the efforts that the forces have from which programmes start
+constexpr double kNoBudget = 1e4;      // units of normal force that stand for any
+constexpr double kEnough = 1.3;        // times the least reach, beyond which a reach is known well enough
+
+}  // namespace
+
+HoldingForce::HoldingForce(GraspSystem& system, HoldingLimits limits)
+    : system_(system),
+      limits_(std::move(limits)),
+      closure_(system, limits_.friction, limits_.torsional),
+      directions_(system.object_joint().space_dimension()),
+      cone_size_(directions_ + (directions_ == 3 && limits_.torsional > 0.0 ? 1 : 0)) {
+  if (limits_.efforts.size() != 0 && limits_.efforts.size() != system.actuated_count())
+    throw Error("efforts must hold " + std::to_string(system.actuated_count()) +
+                " numbers, one for each actuated joint");
+  for (Eigen::Index j = 0; j < limits_.efforts.size(); ++j) {
+    if (!(limits_.efforts(j) > 0.0)) throw Error("efforts must be positive, got " + to_text(limits_.efforts(j)));
+    if (std::isfinite(limits_.efforts(j))) limited_.push_back(static_cast<int>(j));
+  }
+  if (!(limits_.normal_force > 0.0)) throw Error("normal_force must be positive, got " + to_text(limits_.normal_force));
+  if (!std::isfinite(limits_.normal_force) && limited_.empty())
+    throw Error("normal_force may be infinite only where joints have efforts");
+  if (!(limits_.gap > 0.0 && limits_.gap < 1.0))
+    throw Error("gap must be between 0 and 1, got " + to_text(limits_.gap));
+  if (!(limits_.torque_length >= 0.0) || !std::isfinite(limits_.torque_length))
+    throw Error("torque_length must not be negative, got " + to_text(limits_.torque_length));
+}
+
+// Wrenches and efforts of the contacts' coordinates z at x, forces in units; false without force closure.
+bool HoldingForce::prepare(const double* x) {
+  if (!closure_.closes(x, inner_)) return false;
+  const int contacts = system_.contact_count(), dof = system_.object_dof();
+  const Placement& object = system_.model().placement(system_.model().object_joint_index());
+  rotation_ = object.rotation;
+  const Eigen::Vector3d center = object.translation + object.rotation * limits_.center_of_mass;
+  RowMatrix spins;
+  if (!limited_.empty() && cone_size_ == 4) {
+    spins.resize(contacts, system_.actuated_count());
+    system_.normal_spins(x, spins);
+  }
+  wrenches_.setZero(dof, static_cast<Eigen::Index>(contacts) * cone_size_);
+  efforts_.setZero(static_cast<Eigen::Index>(limited_.size()), wrenches_.cols());
+  z_.resize(wrenches_.cols());
+  for (int c = 0; c < contacts; ++c) {
+    const ContactPoint& point = closure_.points()[c];
+    const Eigen::Vector3d n = -point.object_normal, arm = point.object_point - center;
+    const Eigen::Vector3d s = directions_ == 2 ? Eigen::Vector3d(-n.y(), n.x(), 0.0) : n.unitOrthogonal();
+    const Eigen::Vector3d axes[3] = {n, limits_.friction * s, limits_.friction * n.cross(s)};
+    const Eigen::Vector3d f = inner_.forces.row(c).transpose();
+    for (int k = 0; k < cone_size_; ++k) {
+      const Eigen::Index column = static_cast<Eigen::Index>(c) * cone_size_ + k;
+      if (k == directions_) {
+        wrenches_.col(column).tail<3>() = limits_.torsional * n;
+        for (std::size_t j = 0; j < limited_.size(); ++j)
+          efforts_(static_cast<Eigen::Index>(j), column) = limits_.torsional * spins(c, limited_[j]);
+        z_(column) = inner_.torques(c) / limits_.torsional;
+        continue;
+      }
+      const Eigen::Vector3d torque = arm.cross(axes[k]);
+      wrenches_.col(column).head(directions_) = axes[k].head(directions_);
+      wrenches_.col(column).tail(dof - directions_) = torque.tail(dof - directions_);
+      for (std::size_t j = 0; j < limited_.size(); ++j)
+        efforts_(static_cast<Eigen::Index>(j), column) = closure_.J().col(limited_[j]).segment<3>(3 * c).dot(axes[k]);
+      z_(column) = f.dot(axes[k]) / axes[k].squaredNorm();
+    }
+  }
+  for (std::size_t j = 0; j < limited_.size(); ++j)
+    efforts_.row(static_cast<Eigen::Index>(j)) /= limits_.efforts(limited_[j]);
+  const double share = limited_.empty() ? 0.0 : (efforts_ * z_).cwiseAbs().maxCoeff();
+  unit_ = std::isfinite(limits_.normal_force) ? limits_.normal_force : 1.0 / std::max(share, 1e-12);
+  efforts_ *= unit_;
+  z_ *= kStartShare / std::max(1.0, share * unit_);
+  return true;
+}
+
+// The programme of the forces that meet the equations [e x contacts cone_size], equations z = 0.
+void HoldingForce::set_program(const RowMatrix& equations) {
+  const Eigen::Index size = z_.size(), count = equations.rows();
+  basis_.setIdentity(size, size);
+  if (count > 0) {
+    const Eigen::HouseholderQR<Matrix> qr(equations.transpose());
+    Matrix Q = Matrix::Identity(size, size);
+    Q.applyOnTheLeft(qr.householderQ());
+    basis_ = Q.rightCols(size - count);
+  }
+  y_.noalias() = basis_.transpose() * z_;
+  program_.set(basis_, cone_size_, efforts_ * basis_, std::isfinite(limits_.normal_force) ? 1.0 : kNoBudget);
+}
+
+double HoldingForce::largest(const double* x) {
+  if (!prepare(x)) return 0.0;
+  const int dof = system_.object_dof();
+  if (limits_.torque_length > 0.0) {
+    set_program(RowMatrix(0, z_.size()));
+    reach_map_ = wrenches_;
+    reach_map_.bottomRows(dof - directions_) /= limits_.torque_length;
+  } else {
+    set_program(wrenches_.bottomRows(dof - directions_));
+    reach_map_ = wrenches_.topRows(directions_) * basis_;
+  }
+  if (reach_map_.rows() == 2) return unit_ * ball_radius(hull2_);
+  if (reach_map_.rows() == 3) return unit_ * ball_radius(hull3_);
+  return unit_ * ball_radius(hull6_);
+}
+
+// In units. The hull starts from the reaches both ways along the axes of the Dikin ellipsoid, which is about as long
+// and wide as the body.
+template <int D>
+double HoldingForce::ball_radius(WrenchHull<D>& hull) {
+  using Point = typename WrenchHull<D>::Point;
+  if (!program_.start(y_)) return 0.0;
+  program_.center();
+  y_ = program_.y();
+  const Eigen::Matrix<double, D, D> shape = program_.dikin_shape(reach_map_);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, D, D>> axes(shape);
+  optima_.resize(y_.size(), std::max<Eigen::Index>(optima_.cols(), 8 * D));
+  typename WrenchHull<D>::Points points(D, 2 * D);
+  double least = HUGE_VAL;
+  for (int i = 0; i < 2 * D; ++i) {
+    const Vector c = (i % 2 == 0 ? 1.0 : -1.0) * (reach_map_.transpose() * axes.eigenvectors().col(i / 2));
+    program_.start(y_);
+    least = std::min(least, program_.maximize(c, kProgramShare * limits_.gap, kEnough * least).upper);
+    optima_.col(i) = program_.y();
+    points.col(i) = reach_map_ * program_.y();
+  }
+  int count = 2 * D;
+  const auto reach = [&](const Point& direction, const typename WrenchHull<D>::Corners& corners, double smallest,
+                         Point& furthest) {
+    Vector between = Vector::Zero(y_.size());
+    for (const auto corner : corners) between += optima_.col(corner) / D;
+    const Vector c = reach_map_.transpose() * direction;
+    double upper = HUGE_VAL;
+    // Rounding may stop a programme that starts close to many constraints, but not the one from the centre.
+    for (const Vector* from : {&std::as_const(between), &std::as_const(y_)}) {
+      if (!program_.start(*from)) continue;
+      const ContactProgram::Bounds bounds = program_.maximize(c, kProgramShare * limits_.gap, kEnough * smallest);
+      upper = std::min(upper, bounds.upper);
+      if (bounds.lower >= std::min((1.0 - limits_.gap) * upper, kEnough * smallest)) break;
+    }
+    furthest = reach_map_ * program_.y();
+    if (count == optima_.cols()) optima_.conservativeResize(Eigen::NoChange, 2 * count);
+    optima_.col(count++) = program_.y();
+    return upper;
+  };
+  return hull.ball_radius(points, least, limits_.gap, reach);
+}
+
+double HoldingForce::along(const double* x, const double* direction) {
+  if (!prepare(x)) return 0.0;
+  const int dof = system_.object_dof(), torques = dof - directions_;
+  const Eigen::Map<const Vector> in_object(direction, directions_);
+  const Vector d = rotation_.topLeftCorner(directions_, directions_) * in_object;
+  RowMatrix equations(dof - 1, z_.size());
+  equations.topRows(torques) = wrenches_.bottomRows(torques);
+  const Matrix across = d.householderQr().householderQ();  // its first column is along d
+  equations.bottomRows(directions_ - 1) =
+      across.rightCols(directions_ - 1).transpose() * wrenches_.topRows(directions_);
+  set_program(equations);
+  if (!program_.start(y_)) return 0.0;
+  const Vector c = -basis_.transpose() * (wrenches_.topRows(directions_).transpose() * d);
+  return unit_ * program_.maximize(c, kLoadGap, HUGE_VAL).lower;
+}
+
+}  // namespace graspatlas
