@@ -190,6 +190,9 @@ double ContactProgram::line_search(double slope) {
   for (int i = 0; i < contacts_; ++i) {
     quadratic(i, a0, a1, a2);
     end = std::min(end, first_root(a2, a1, a0));
+    // Through the tip of the cone there is a double root, which rounding may hide.
+    const Eigen::Index at = static_cast<Eigen::Index>(i) * cone_size_;
+    if (dz_(at) < 0.0) end = std::min(end, -z_(at) / dz_(at));
   }
   if (limits_.rows() > 0) dv_.noalias() = limits_.lazyProduct(step_);
   for (Eigen::Index j = 0; j < limits_.rows(); ++j)
@@ -237,8 +240,9 @@ ContactProgram::Bounds ContactProgram::maximize(const Vector& c, double relative
       bounds.upper = std::min(bounds.upper, bounds.lower + b + (parameter_ - d) / weight);
     if (bounds.lower >= (1.0 - relative_gap) * bounds.upper || bounds.lower >= enough) break;
     const double most = 2.0 * parameter_ / (relative_gap * std::max(bounds.lower, std::sqrt(a)));
-    const double next = nearest < kFar ? std::min(best + std::sqrt((kLong - nearest) / a), most) : kBack * best;
-    step_ = std::max(next, 0.0) * along_ - center_;
+    const double next =
+        std::max(nearest < kFar ? std::min(best + std::sqrt((kLong - nearest) / a), most) : kBack * best, 0.0);
+    step_ = next * along_ - center_;
     ++steps_;
     const double decrement = next * (a * next - 2.0 * b) + d;
     y_ += (decrement < kShort ? 1.0 : line_search(next * c.dot(step_))) * step_;

@@ -6,8 +6,8 @@ The contact forces :math:`f_i` balance a disturbance w at the object's centre of
     \sum_i n_i^\top f_i \le N, \qquad |J^\top f| \le \tau^{max}
 
 with the inward normals :math:`n_i`, the budget N, and the joints' efforts where they are asked for. Soft fingers have
-the limit surface of :func:`graspatlas.quality.force_closure_margin`. The hand controls its forces: joints exert what the
-disturbance asks for, and nothing is said of those that friction and stiffness alone would cause.
+the limit surface of :func:`graspatlas.quality.force_closure_margin`. The hand controls its forces: joints exert what
+the disturbance asks for, and nothing is said of those that friction and stiffness alone would cause.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def holding_force(
     efforts: Efforts = False,
     gap: float = GAP,
 ) -> Array:
-    r"""Largest force at the object's centre of mass, from whatever side, that a grasp withstands [N]; 0 without closure.
+    r"""Largest force at the object's centre of mass, from any side, that a grasp withstands [N]; 0 without closure.
 
     .. math:: \max r \;:\; \forall \, \|w\| \le r \;\; \exists \, f_i \in \mathrm{cone}_i : \; G f + w = 0, \;\;
         \sum_i n_i^\top f_i \le N, \;\; |J^\top f| \le \tau^{max}
