@@ -59,6 +59,7 @@ def grasp_rows(name: str, dimension: int, radius: float) -> None:
         "min_weight",
     ):
         index_row(index, problem, atlas)
+    force_rows(problem, atlas)
     if dimension == 2:
         collision_row(problem, atlas)
 
@@ -70,6 +71,23 @@ def index_row(index: str, problem: ga.Problem, atlas: ga.Atlas) -> None:
     )
     each, best = 1e6 * seconds / len(values), values.max()
     print(f"{'  ' + index:32} {len(values):7d} grasps {1e3 * seconds:9.1f} ms {each:9.2f} us each   best {best:.6g}")
+
+
+def force_rows(problem: ga.Problem, atlas: ga.Atlas) -> None:
+    """Time contact forces and holding forces of the charts with force closure, soft fingers, and print rows."""
+    grasps = ga.Grasps(problem, atlas.centers, atlas.system)
+    closed = grasps.x[ga.quality.force_closure_margin(grasps, 0.8, 0.003) > 0.0][:250]  # so few are on one thread
+    grasps = ga.Grasps(problem, closed, atlas.system)
+    grasps.contact_points  # noqa: B018  (computed once)
+    for name, work in (
+        ("contact forces", lambda: grasps.contact_forces(friction=0.8, torsional=0.003).margin),
+        ("holding_force, to 1 %", lambda: ga.quality.holding_force(grasps, 0.8, None, 0.003, gap=0.01)),
+        ("holding_force", lambda: ga.quality.holding_force(grasps, 0.8, None, 0.003)),
+        ("holding_force with efforts", lambda: ga.quality.holding_force(grasps, 0.8, None, 0.003, efforts=0.5)),
+    ):
+        seconds, values = median_seconds(work)
+        each, best = 1e6 * seconds / len(values), values.max()
+        print(f"{'  ' + name:32} {len(values):7d} closed {1e3 * seconds:9.1f} ms {each:9.2f} us each   best {best:.6g}")
 
 
 def collision_row(problem: ga.Problem, atlas: ga.Atlas) -> None:

@@ -167,7 +167,9 @@ def test_broken_predicates(predicate: Any, message: str) -> None:
         ga.optimize(ga.load_problem("planar_hand"), require=[predicate])
 
 
-@pytest.mark.parametrize("text", ["force_closure:0.5:0.02", "collision_free:0.002:0", "joint_margin:0.05"])
+@pytest.mark.parametrize(
+    "text", ["force_closure:0.5:0.02", "collision_free:0.002:0", "joint_margin:0.05", "holding_force:1"]
+)
 def test_text_of_requirements(text: str) -> None:
     assert requirement_name(parse_requirement(text)) == text
     assert parse_requirement(text.split(":")[0]) == type(parse_requirement(text))()
@@ -176,6 +178,8 @@ def test_text_of_requirements(text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        ("holding_force:0", "at_least .* must be positive"),
+        ("holding_force:1:0.5:-2", "normal_force .* must not be negative"),
         ("force_closer", "did you mean 'force_closure'"),
         ("force_closure:slippery", "not a number"),
         ("force_closure:-1", "friction .* must be positive"),
@@ -221,7 +225,8 @@ def test_a_class_enters_itself_under_its_name():
             name: ClassVar[str] = "upright"
             cost: ClassVar[int] = 1
 
-        assert list(ga.requirements.REQUIREMENTS) == ["joint_margin", "force_closure", "upright", "collision_free"]
+        dearest = ["collision_free", "holding_force"]
+        assert list(ga.requirements.REQUIREMENTS) == ["joint_margin", "force_closure", "upright", *dearest]
         made = parse_requirement("upright:0.25")
         assert made == Upright(0.25)
         assert ga.requirements.requirement_from_dict(made.to_dict()) == made
@@ -234,7 +239,7 @@ def test_named_requirements_are_known_wherever_a_problem_is_read():
     """A problem reads requirements that it does not import: any import of the package enters them."""
     code = "from graspatlas.problem.requirement import REQUIREMENTS; print(*REQUIREMENTS)"
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert printed.split() == ["joint_margin", "force_closure", "collision_free"]
+    assert printed.split() == ["joint_margin", "force_closure", "collision_free", "holding_force"]
 
 
 def test_what_is_only_stated_cannot_be_checked(can):

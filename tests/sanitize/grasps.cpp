@@ -7,6 +7,7 @@
 #include "graspatlas/grasp/grasp_system.hpp"
 #include "graspatlas/manifold/lease.hpp"
 #include "graspatlas/quality/force_closure.hpp"
+#include "graspatlas/quality/holding_force.hpp"
 #include "graspatlas/quality/manipulability.hpp"
 #include "strain.hpp"
 
@@ -121,6 +122,11 @@ void check_jacobian(GraspSystem& system, const double* x) {
   }
 }
 
+HoldingLimits holding(const GraspSystem& system, double torsional, double effort, double torque_length) {
+  const Vector efforts = Vector::Constant(effort > 0.0 ? system.actuated_count() : 0, effort);
+  return {0.5, torsional, 10.0, efforts, {0.001, 0.002, -0.003}, torque_length, 0.02};
+}
+
 void trace(int kept, double radius, std::int64_t limit) {
   const Tripod made = tripod(kept, 0.01);
   GraspSystem& system = *made.system;
@@ -133,6 +139,9 @@ void trace(int kept, double radius, std::int64_t limit) {
   require(atlas.count() > 10, "the atlas of a made-up grasp grows");
   Manipulability manipulability(system, 1e-3);
   ForceClosure closure(system, 0.5, 0.0), soft(system, 0.5, 0.005);
+  HoldingForce hard_force(system, holding(system, 0.0, 0.0, 0.0)), soft_force(system, holding(system, 0.005, 0.0, 0.0)),
+      weak_force(system, holding(system, 0.0, 0.1, 0.0)), twisted(system, holding(system, 0.0, 0.0, 0.05));
+  const double down[] = {0.0, 0.0, -1.0};
   std::vector<double> axes(system.object_dof()), R(system.equation_count());
   for (std::int64_t i = 0; i < atlas.count(); ++i) {
     system.residual(atlas.center(i), R.data());
@@ -142,6 +151,13 @@ void trace(int kept, double radius, std::int64_t limit) {
     const double margin = closure.margin(atlas.center(i));
     require(std::isfinite(margin) && margin >= 0.0, "margins are numbers");
     require(soft.margin(atlas.center(i)) >= margin - 1e-9, "soft fingers hold no worse");
+    const double force = hard_force.largest(atlas.center(i));
+    require((force > 0.0) == (margin > 0.0), "closed grasps hold something, others nothing");
+    require(weak_force.largest(atlas.center(i)) <= force * 1.03 + 1e-9, "efforts add no force");
+    require(soft_force.largest(atlas.center(i)) >= force * 0.97 - 1e-9, "soft fingers withstand no less");
+    const double along = hard_force.along(atlas.center(i), down);
+    require(!(along < force * 0.97), "what is withstood from all sides is along one");
+    if (i % 10 == 0) require(twisted.largest(atlas.center(i)) <= force * 1.03 + 1e-9, "torques are no help");
   }
 }
 
@@ -198,6 +214,17 @@ void wrong_systems() {
   refuse([&] { Manipulability(*made.system, 0.0); }, "length_unit");
   refuse([&] { ForceClosure(*made.system, -1.0, 0.0); }, "friction");
   refuse([&] { ForceClosure(*made.system, 0.5, -1.0); }, "torsional");
+  const auto refuse_limits = [&](const char* message, const auto& spoil) {
+    HoldingLimits limits = holding(*made.system, 0.0, 0.1, 0.0);
+    spoil(limits);
+    refuse([&] { HoldingForce{*made.system, limits}; }, message);
+  };
+  refuse_limits("friction", [](HoldingLimits& limits) { limits.friction = 0.0; });
+  refuse_limits("efforts", [](HoldingLimits& limits) { limits.efforts = Vector::Ones(2); });
+  refuse_limits("efforts", [](HoldingLimits& limits) { limits.efforts(1) = std::nan(""); });
+  refuse_limits("normal_force", [](HoldingLimits& limits) { limits.normal_force = 0.0; });
+  refuse_limits("torque_length", [](HoldingLimits& limits) { limits.torque_length = -1.0; });
+  refuse_limits("gap", [](HoldingLimits& limits) { limits.gap = 0.0; });
 }
 
 // Grasps that no manifold has: qualities of arbitrary postures, contacts that miss, all fingers straight.
@@ -212,8 +239,13 @@ void arbitrary_grasps() {
     for (int c = 0; c < 12; ++c) x[c] = i == 0 ? 0.0 : x[c] + size * random.normal();
     manipulability.semi_axes(x.data(), axes.data());
     const double friction = std::pow(10.0, random.uniform(-6.0, 6.0));
-    for (const double torsional : {0.0, 0.01 * friction})
+    for (const double torsional : {0.0, 0.01 * friction}) {
       ForceClosure(*made.system, friction, torsional).margin(x.data());
+      HoldingLimits limits = holding(*made.system, torsional, i % 2 == 0 ? 0.1 : 0.0, 0.0);
+      limits.friction = friction;
+      const double force = HoldingForce(*made.system, limits).largest(x.data());
+      require(std::isfinite(force) && force >= 0.0, "holding forces are numbers");
+    }
   }
 }
 

@@ -15,6 +15,8 @@ constexpr double kCentred = 0.25;          // of a point that is the centre
 constexpr double kLong = 60.0;             // of steps along the path
 constexpr double kFar = 2.5;               // of points so far from the path that they go back to it first ...
 constexpr double kBack = 0.6;              // ... where its weight is so many times the weight of the nearest point
+constexpr int kQuickSteps = 10;            // after which a point ...
+constexpr double kClose = 0.8;             // ... must be as close as this to go on: it may have run into a boundary
 constexpr double kNearly = 0.9;            // of the way to the boundary that a step goes at most
 constexpr int kSearches = 6;               // of a line, by Newton's method
 constexpr double kFlatEnough = 0.2;        // of the slope that may be left of it
@@ -223,8 +225,8 @@ double ContactProgram::line_search(double slope) {
 }
 
 // With the Newton step w H^-1 c - H^-1 g for the weight w its squared decrement is a w^2 - 2 b w + d. Each step takes
-// the largest weight at which that is no more than kLong; and any weight at which it is below one gives a dual point,
-// the objective of which is b + (parameter - d) / w above c . y.
+// the largest weight at which that is no more than kLong, unless the path is far away; and any weight at which it is
+// below one gives a dual point, the objective of which is b + (parameter - d) / w above c . y.
 ContactProgram::Bounds ContactProgram::maximize(const Vector& c, double relative_gap, double enough) {
   Bounds bounds{c.dot(y_), HUGE_VAL};
   for (int steps = 0; steps < kMaxSteps; ++steps) {
@@ -240,8 +242,9 @@ ContactProgram::Bounds ContactProgram::maximize(const Vector& c, double relative
       bounds.upper = std::min(bounds.upper, bounds.lower + b + (parameter_ - d) / weight);
     if (bounds.lower >= (1.0 - relative_gap) * bounds.upper || bounds.lower >= enough) break;
     const double most = 2.0 * parameter_ / (relative_gap * std::max(bounds.lower, std::sqrt(a)));
+    const double far = steps < kQuickSteps ? kFar : kClose;
     const double next =
-        std::max(nearest < kFar ? std::min(best + std::sqrt((kLong - nearest) / a), most) : kBack * best, 0.0);
+        std::max(nearest < far ? std::min(best + std::sqrt((kLong - nearest) / a), most) : kBack * best, 0.0);
     step_ = next * along_ - center_;
     ++steps_;
     const double decrement = next * (a * next - 2.0 * b) + d;

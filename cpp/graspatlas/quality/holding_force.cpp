@@ -174,8 +174,10 @@ double HoldingForce::along(const double* x, const double* direction) {
       across.rightCols(directions_ - 1).transpose() * wrenches_.topRows(directions_);
   set_program(equations);
   if (!program_.start(y_)) return 0.0;
+  program_.center();
   const Vector c = -basis_.transpose() * (wrenches_.topRows(directions_).transpose() * d);
-  return unit_ * program_.maximize(c, kLoadGap, HUGE_VAL).lower;
+  const ContactProgram::Bounds bounds = program_.maximize(c, kLoadGap, HUGE_VAL);
+  return bounds.lower >= (1.0 - kLoadGap) * bounds.upper ? unit_ * bounds.lower : std::nan("");
 }
 
 }  // namespace graspatlas

@@ -40,7 +40,7 @@ class HoldingForce {
   double largest(const double* x);
 
   /// The largest force along a unit vector [space_dimension] in the object's frame, at its centre of mass, that the
-  /// grasp withstands [N], to one part in a million.
+  /// grasp withstands [N], to one part in a million; NaN where rounding leaves it less certain.
   double along(const double* x, const double* direction);
 
  private:

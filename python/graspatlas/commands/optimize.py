@@ -53,7 +53,8 @@ def add_optimize_command(commands: Subcommands) -> None:
         default=[],
         metavar="NAME[:VALUE...]",
         help="requirement that the best grasp must meet, such as collision_free, force_closure:0.5:0.02 (friction, "
-        "margin) or joint_margin:0.05; may be given several times; replaces those of the problem, 'none' drops them",
+        "margin), holding_force:2 (newtons) or joint_margin:0.05; may be given several times; replaces those of the "
+        "problem, 'none' drops them",
     )
     best.add_argument(
         "--refine",

@@ -63,7 +63,7 @@ def holding_force(
             its effort stands for any.
         torsional: Torsional friction [m] of soft fingers; 0 for hard ones.
         torque_length: Length that divides torques of disturbances [m]; 0 for forces alone. With torques the body has
-            six dimensions, and a value takes tens of milliseconds rather than a tenth of one: take a `gap` of 0.01.
+            six dimensions, and a value takes milliseconds: take a `gap` of 0.01.
         efforts: Limits of the actuated joints: False for none, True for those of the hand's URDF, where joints that
             state none have none; a number for all joints, or numbers by joint [N m, of joints that slide N].
         gap: Relative difference from the largest force, at most.
@@ -105,7 +105,8 @@ def resisted_load(
         One value for each grasp (n,), in newtons, to one part in a million from below.
 
     Raises:
-        GraspAtlasError: If an argument is out of its range, or efforts are asked for that the hand does not state.
+        GraspAtlasError: If an argument is out of its range, efforts are asked for that the hand does not state, or
+            rounding leaves a value less certain.
     """
     axes, n = grasps.problem.object_joint_model.translations, len(grasps)
     given = number_array(direction, "direction")
@@ -119,7 +120,13 @@ def resisted_load(
         raise GraspAtlasError("direction has the length 0; say where the force points")
     limits = _limits(grasps, friction, normal_force, torsional, 0.0, efforts, GAP)
     directions = np.ascontiguousarray(np.broadcast_to(given / lengths, (n, axes)))
-    return np.asarray(_core.resisted_loads(grasps.system, grasps.x, directions, limits))
+    loads = np.asarray(_core.resisted_loads(grasps.system, grasps.x, directions, limits))
+    if np.isnan(loads).any():
+        raise GraspAtlasError(
+            f"the load that grasp {int(np.isnan(loads).argmax())} resists cannot be told to one part in a million, so "
+            "near is it to losing force closure: require a margin of force closure"
+        )
+    return loads
 
 
 def _limits(
