@@ -17,7 +17,8 @@ constexpr double kFar = 2.5;               // of points so far from the path tha
 constexpr double kBack = 0.6;              // ... where its weight is so many times the weight of the nearest point
 constexpr int kQuickSteps = 10;            // after which a point ...
 constexpr double kClose = 0.8;             // ... must be as close as this to go on: it may have run into a boundary
-constexpr double kNearly = 0.9;            // of the way to the boundary that a step goes at most
+constexpr double kNearly = 0.9;            // of the way to the boundary from which a step is searched at most ...
+constexpr double kAtMost = 0.999;          // ... and where it ends at most, after a search
 constexpr int kSearches = 6;               // of a line, by Newton's method
 constexpr double kFlatEnough = 0.2;        // of the slope that may be left of it
 constexpr double kSmallestPivot = 1e-300;  // of a Hessian
@@ -75,7 +76,6 @@ void ContactProgram::set(const RowMatrix& rows, int cone_size, const RowMatrix& 
       C.noalias() += side.transpose() * side;
     }
   }
-  steps_ = 0;
 }
 
 bool ContactProgram::start(const Vector& y) {
@@ -176,39 +176,48 @@ void ContactProgram::solve(const Vector& right, Vector& out) {
   });
 }
 
-// How far to go along step_, towards the least of the barrier less slope t: `slope` is the weight times c . step_.
-double ContactProgram::line_search(double slope) {
-  dz_.noalias() = rows_.lazyProduct(step_);
+// z^2 - |z_side|^2 of contact i at a way t along step_: a0 + 2 a1 t + a2 t^2.
+ContactProgram::Quadratic ContactProgram::along_step(int i) const {
+  const Eigen::Index at = static_cast<Eigen::Index>(i) * cone_size_;
+  Quadratic q{z_(at) * z_(at), z_(at) * dz_(at), dz_(at) * dz_(at)};
+  for (Eigen::Index k = at + 1; k < at + cone_size_; ++k) {
+    q.a0 -= z_(k) * z_(k);
+    q.a1 -= z_(k) * dz_(k);
+    q.a2 -= dz_(k) * dz_(k);
+  }
+  return q;
+}
+
+// How far it is along step_ to the nearest boundary.
+double ContactProgram::way_out() const {
   const double budget_step = budget_row_.dot(step_);
   double end = budget_step > 0.0 ? budget_left_ / budget_step : HUGE_VAL;
-  const auto quadratic = [&](int i, double& a0, double& a1, double& a2) {
-    const Eigen::Index at = static_cast<Eigen::Index>(i) * cone_size_;
-    a0 = z_(at) * z_(at), a1 = z_(at) * dz_(at), a2 = dz_(at) * dz_(at);
-    for (Eigen::Index k = at + 1; k < at + cone_size_; ++k) {
-      a0 -= z_(k) * z_(k), a1 -= z_(k) * dz_(k), a2 -= dz_(k) * dz_(k);
-    }
-  };
-  double a0, a1, a2;
   for (int i = 0; i < contacts_; ++i) {
-    quadratic(i, a0, a1, a2);
-    end = std::min(end, first_root(a2, a1, a0));
+    const Quadratic q = along_step(i);
+    end = std::min(end, first_root(q.a2, q.a1, q.a0));
     // Through the tip of the cone there is a double root, which rounding may hide.
     const Eigen::Index at = static_cast<Eigen::Index>(i) * cone_size_;
     if (dz_(at) < 0.0) end = std::min(end, -z_(at) / dz_(at));
   }
-  if (limits_.rows() > 0) dv_.noalias() = limits_.lazyProduct(step_);
   for (Eigen::Index j = 0; j < limits_.rows(); ++j)
     if (dv_(j) != 0.0) end = std::min(end, ((dv_(j) > 0.0 ? 1.0 : -1.0) - v_(j)) / dv_(j));
+  return end;
+}
+
+// How far to go along step_, towards the least of the barrier less slope t: `slope` is the weight times c . step_.
+double ContactProgram::line_search(double slope) {
+  dz_.noalias() = rows_.lazyProduct(step_);
+  dv_.noalias() = limits_.lazyProduct(step_);
+  const double budget_step = budget_row_.dot(step_), end = way_out(), first_slope = slope - gradient_.dot(step_);
   double low = 0.0, high = end, t = std::min(1.0, kNearly * end);
-  const double first_slope = slope + step_.dot(-gradient_);
   for (int search = 0; search < kSearches; ++search) {
-    double first = slope - budget_step / (budget_left_ - t * budget_step);
-    double second = std::pow(budget_step / (budget_left_ - t * budget_step), 2);
+    const double budget_rate = budget_step / (budget_left_ - t * budget_step);
+    double first = slope - budget_rate, second = budget_rate * budget_rate;
     for (int i = 0; i < contacts_; ++i) {
-      quadratic(i, a0, a1, a2);
-      const double s = 1.0 / (a0 + t * (2.0 * a1 + t * a2)), rate = 2.0 * (a1 + t * a2) * s;
+      const Quadratic q = along_step(i);
+      const double s = 1.0 / (q.a0 + t * (2.0 * q.a1 + t * q.a2)), rate = 2.0 * (q.a1 + t * q.a2) * s;
       first += rate;
-      second += rate * rate - 2.0 * a2 * s;
+      second += rate * rate - 2.0 * q.a2 * s;
     }
     for (Eigen::Index j = 0; j < limits_.rows(); ++j) {
       const double v = v_(j) + t * dv_(j), left = 1.0 / (1.0 - v * v), rate = 2.0 * v * dv_(j) * left;
@@ -217,11 +226,10 @@ double ContactProgram::line_search(double slope) {
     }
     if (std::abs(first) <= kFlatEnough * first_slope) break;
     (first > 0.0 ? low : high) = t;
-    double next = second > 0.0 ? t + first / second : HUGE_VAL;
-    if (!(next > low && next < high)) next = std::isfinite(high) ? 0.5 * (low + high) : 2.0 * t;
-    t = next;
+    t = second > 0.0 ? t + first / second : HUGE_VAL;
+    if (!(t > low && t < high)) t = std::isfinite(high) ? 0.5 * (low + high) : 2.0 * low;
   }
-  return std::min(t, std::isfinite(end) ? 0.999 * end : t);
+  return std::isfinite(end) ? std::min(t, kAtMost * end) : t;
 }
 
 // With the Newton step w H^-1 c - H^-1 g for the weight w its squared decrement is a w^2 - 2 b w + d. Each step takes
@@ -246,7 +254,6 @@ ContactProgram::Bounds ContactProgram::maximize(const Vector& c, double relative
     const double next =
         std::max(nearest < far ? std::min(best + std::sqrt((kLong - nearest) / a), most) : kBack * best, 0.0);
     step_ = next * along_ - center_;
-    ++steps_;
     const double decrement = next * (a * next - 2.0 * b) + d;
     y_ += (decrement < kShort ? 1.0 : line_search(next * c.dot(step_))) * step_;
     bounds.lower = c.dot(y_);
@@ -261,7 +268,6 @@ void ContactProgram::center() {
     step_ = -center_;
     const double decrement = gradient_.dot(center_);
     if (!(decrement > kCentred)) return;
-    ++steps_;
     y_ += (decrement < kShort ? 1.0 : line_search(0.0)) * step_;
   }
 }

@@ -39,10 +39,11 @@ class ContactProgram {
   /// ellipsoid, which lies inside what the forces reach.
   Matrix dikin_shape(const RowMatrix& E);
 
-  /// Newton steps since the programme was set.
-  int steps() const { return steps_; }
-
  private:
+  struct Quadratic {
+    double a0, a1, a2;
+  };
+
   double inside() const;
   void linearize();
   template <int N>
@@ -50,9 +51,11 @@ class ContactProgram {
   template <int N>
   void factorize_sized();
   void solve(const Vector& right, Vector& out);
+  Quadratic along_step(int i) const;
+  double way_out() const;
   double line_search(double slope);
 
-  int contacts_ = 0, cone_size_ = 0, steps_ = 0;
+  int contacts_ = 0, cone_size_ = 0;
   double parameter_ = 0.0;  // of the barrier
   RowMatrix rows_, limits_;
   Vector budget_row_;

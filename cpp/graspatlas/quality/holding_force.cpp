@@ -50,37 +50,14 @@ bool HoldingForce::prepare(const double* x) {
   const Placement& object = system_.model().placement(system_.model().object_joint_index());
   rotation_ = object.rotation;
   const Eigen::Vector3d center = object.translation + object.rotation * limits_.center_of_mass;
-  RowMatrix spins;
-  if (!limited_.empty() && cone_size_ == 4) {
-    spins.resize(contacts, system_.actuated_count());
-    system_.normal_spins(x, spins);
+  if (!limited_.empty() && cone_size_ > directions_) {
+    spins_.resize(contacts, system_.actuated_count());
+    system_.normal_spins(x, spins_);
   }
   wrenches_.setZero(dof, static_cast<Eigen::Index>(contacts) * cone_size_);
   efforts_.setZero(static_cast<Eigen::Index>(limited_.size()), wrenches_.cols());
   z_.resize(wrenches_.cols());
-  for (int c = 0; c < contacts; ++c) {
-    const ContactPoint& point = closure_.points()[c];
-    const Eigen::Vector3d n = -point.object_normal, arm = point.object_point - center;
-    const Eigen::Vector3d s = directions_ == 2 ? Eigen::Vector3d(-n.y(), n.x(), 0.0) : n.unitOrthogonal();
-    const Eigen::Vector3d axes[3] = {n, limits_.friction * s, limits_.friction * n.cross(s)};
-    const Eigen::Vector3d f = inner_.forces.row(c).transpose();
-    for (int k = 0; k < cone_size_; ++k) {
-      const Eigen::Index column = static_cast<Eigen::Index>(c) * cone_size_ + k;
-      if (k == directions_) {
-        wrenches_.col(column).tail<3>() = limits_.torsional * n;
-        for (std::size_t j = 0; j < limited_.size(); ++j)
-          efforts_(static_cast<Eigen::Index>(j), column) = limits_.torsional * spins(c, limited_[j]);
-        z_(column) = inner_.torques(c) / limits_.torsional;
-        continue;
-      }
-      const Eigen::Vector3d torque = arm.cross(axes[k]);
-      wrenches_.col(column).head(directions_) = axes[k].head(directions_);
-      wrenches_.col(column).tail(dof - directions_) = torque.tail(dof - directions_);
-      for (std::size_t j = 0; j < limited_.size(); ++j)
-        efforts_(static_cast<Eigen::Index>(j), column) = closure_.J().col(limited_[j]).segment<3>(3 * c).dot(axes[k]);
-      z_(column) = f.dot(axes[k]) / axes[k].squaredNorm();
-    }
-  }
+  for (int c = 0; c < contacts; ++c) set_contact(c, center);
   for (std::size_t j = 0; j < limited_.size(); ++j)
     efforts_.row(static_cast<Eigen::Index>(j)) /= limits_.efforts(limited_[j]);
   const double share = limited_.empty() ? 0.0 : (efforts_ * z_).cwiseAbs().maxCoeff();
@@ -88,6 +65,29 @@ bool HoldingForce::prepare(const double* x) {
   efforts_ *= unit_;
   z_ *= kStartShare / std::max(1.0, share * unit_);
   return true;
+}
+
+// Columns of one contact: a unit along the normal, what the cone has across it for that, and the torque about it.
+void HoldingForce::set_contact(int c, const Eigen::Vector3d& center) {
+  const ContactPoint& point = closure_.points()[c];
+  const Eigen::Vector3d n = -point.object_normal, arm = point.object_point - center;
+  const Eigen::Vector3d s = directions_ == 2 ? Eigen::Vector3d(-n.y(), n.x(), 0.0) : n.unitOrthogonal();
+  const Eigen::Vector3d axes[3] = {n, limits_.friction * s, limits_.friction * n.cross(s)};
+  const Eigen::Vector3d f = inner_.forces.row(c).transpose();
+  const Eigen::Index first = static_cast<Eigen::Index>(c) * cone_size_, torques = system_.object_dof() - directions_;
+  for (int k = 0; k < directions_; ++k) {
+    auto wrench = wrenches_.col(first + k);
+    wrench.head(directions_) = axes[k].head(directions_);
+    wrench.tail(torques) = arm.cross(axes[k]).tail(torques);
+    for (std::size_t j = 0; j < limited_.size(); ++j)
+      efforts_(static_cast<Eigen::Index>(j), first + k) = closure_.J().col(limited_[j]).segment<3>(3 * c).dot(axes[k]);
+    z_(first + k) = f.dot(axes[k]) / axes[k].squaredNorm();
+  }
+  if (cone_size_ == directions_) return;
+  wrenches_.col(first + directions_).tail<3>() = limits_.torsional * n;
+  for (std::size_t j = 0; j < limited_.size(); ++j)
+    efforts_(static_cast<Eigen::Index>(j), first + directions_) = limits_.torsional * spins_(c, limited_[j]);
+  z_(first + directions_) = inner_.torques(c) / limits_.torsional;
 }
 
 // The programme of the forces that meet the equations [e x contacts cone_size], equations z = 0.

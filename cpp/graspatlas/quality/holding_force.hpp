@@ -45,6 +45,7 @@ class HoldingForce {
 
  private:
   bool prepare(const double* x);
+  void set_contact(int c, const Eigen::Vector3d& center);
   void set_program(const RowMatrix& equations);
   template <int D>
   double ball_radius(WrenchHull<D>& hull);
@@ -57,6 +58,7 @@ class HoldingForce {
   ForceClosure::Forces inner_;
   double unit_ = 1.0;            // of forces [N]: the budget, or where the first joint comes to its effort
   RowMatrix wrenches_;           // [dof x contacts cone_size]: of the unit coordinates z, about the centre of mass
+  RowMatrix spins_;              // see GraspSystem::normal_spins
   RowMatrix efforts_;            // [limited joints x contacts cone_size]: shares of the efforts
   Eigen::Matrix3d rotation_;     // of the object
   Vector z_, y_;                 // inner forces as z, and as y of the programme
