@@ -13,11 +13,11 @@ namespace graspatlas {
 
 namespace {
 
-constexpr double kProgramShare = 0.2;  // of the gap, that of each reach
+constexpr double kProgramShare = 0.5;  // of the gap, that of each reach
 constexpr double kLoadGap = 1e-6;      // relative, of the force along one direction
 constexpr double kStartShare = 0.5;    // of the budget and the efforts that the forces have from which programmes start
 constexpr double kNoBudget = 1e4;      // units of normal force that stand for any
-constexpr double kEnough = 1.3;        // times the least reach, beyond which a reach is known well enough
+constexpr double kEnough = 1.1;        // times the least reach, beyond which a reach is known well enough
 
 }  // namespace
 
