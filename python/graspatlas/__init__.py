@@ -16,8 +16,9 @@ from graspatlas.atlas.build import build_atlas
 from graspatlas.atlas.status import Closed, Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.execution.approach import Approach
-from graspatlas.execution.pregrasp import Pregrasp
 from graspatlas.execution.contact_forces import ContactForces
+from graspatlas.execution.pregrasp import Pregrasp
+from graspatlas.formats.export import export_grasps
 from graspatlas.grasps.grasps import Grasp, Grasps
 from graspatlas.hand import motions
 from graspatlas.hand.body import Body
@@ -40,6 +41,8 @@ from graspatlas.requirements.joint_margin import JointMargin
 from graspatlas.result.refinement import Refinement
 from graspatlas.result.result import Result, load_result
 from graspatlas.search.grasp_search import find_grasps
+from graspatlas.simulation.outcome import Simulation, load_simulation
+from graspatlas.simulation.simulate import simulate
 from graspatlas.systems.projection import project
 from graspatlas.systems.system import System
 from graspatlas.version import __version__ as __version__
@@ -87,6 +90,7 @@ __all__ = [
     "Result",
     "Samples",
     "SearchStatus",
+    "Simulation",
     "Status",
     "System",
     "batched",
@@ -94,11 +98,13 @@ __all__ = [
     "bundled_problems",
     "climb",
     "densify",
+    "export_grasps",
     "export_html",
     "find_components",
     "find_grasps",
     "load_problem",
     "load_result",
+    "load_simulation",
     "local_maxima",
     "motions",
     "optimize",
@@ -119,6 +125,7 @@ __all__ = [
     "refine",
     "save_picture",
     "shortest_path",
+    "simulate",
     "systems",
     "view",
 ]

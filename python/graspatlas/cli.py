@@ -15,6 +15,7 @@ from graspatlas.commands.optimize import add_optimize_command
 from graspatlas.commands.problem import add_problem_commands
 from graspatlas.commands.reproduce import add_reproduce_command
 from graspatlas.commands.result import add_result_commands
+from graspatlas.commands.simulate import add_simulate_command
 from graspatlas.commands.sweep import add_sweep_command
 from graspatlas.errors import GraspAtlasError
 from graspatlas.start_up import hear_interrupts
@@ -103,7 +104,7 @@ def _parser() -> argparse.ArgumentParser:
 
     for add in (
         *(add_list_command, add_problem_commands, add_optimize_command, add_result_commands, add_analysis_commands),
-        *(add_sweep_command, add_reproduce_command),
+        *(add_simulate_command, add_sweep_command, add_reproduce_command),
     ):
         add(commands)
     return parser

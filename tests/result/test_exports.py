@@ -442,14 +442,14 @@ def test_pregrasps_in_files(folder: Path, result: ga.Result, capfd: pytest.Captu
 def test_export_command_refuses(folder: Path, result: ga.Result, capfd: pytest.CaptureFixture[str]) -> None:
     out = folder / "g.csv"
     for words, message in (
-        (["export", folder], "nothing to write: give --grasps FILE or --table FILE"),
+        (["export", folder], "nothing to write: give --grasps FILE, --table FILE, or --format NAME --to PATH"),
         (["export", folder / "nowhere", "--grasps", out], r"nowhere' does not exist"),
         (["export", folder, "--grasps", folder / "g.txt"], r"must end in \.csv or \.json"),
         (["export", folder, "--table", folder / "t.xlsx"], r"must end in \.csv or \.parquet"),
         (["export", folder, "--grasps", out, "--chart", "middle"], "'middle' names no grasp"),
         (["export", folder, "--grasps", out, "--chart", "1", "--best", "2"], "give either charts"),
         (["export", folder, "--grasps", out, "--pregrasp", "10"], r"pregrasp must be above 0 and at most 0\.1, got 10"),
-        (["export", folder, "--table", folder / "t.csv", "--pregrasp", "0.01"], "give --grasps FILE too"),
+        (["export", folder, "--table", folder / "t.csv", "--pregrasp", "0.01"], "give --grasps FILE, or --format NAME"),
         (["path", folder, "--joint-speed", "1"], "--joint-speed is for the table: give --csv FILE too"),
         (["path", folder, "--joint-speed", "slow", "--csv", out], "joint_speed must be .* got 'slow'"),
     ):

@@ -29,15 +29,20 @@ class CollisionShapes:
         object: Shapes of the object, placed in its own frame.
         ignored: Pairs of numbers of ``hand``, the smaller first, that may touch: shapes of one joint, links that the
             SRDF lists, and without an SRDF those of neighbouring joints.
-        touching: Numbers of ``hand`` that touch the object: for each contact the shapes of the link that it is stated
-            on. A link without shapes, such as a mere frame, stands for the next one that it is fixed to and that has
-            some; where there is none, for all that the same joint carries.
+        touching_by_contact: Numbers of ``hand`` that touch the object at each contact (m,): the shapes of the link
+            that it is stated on. A link without shapes, such as a mere frame, stands for the next one that it is fixed
+            to and that has some; where there is none, for all that the same joint carries.
     """
 
     hand: tuple[Shape, ...]
     object: tuple[Shape, ...]
     ignored: frozenset[tuple[int, int]]
-    touching: frozenset[int]
+    touching_by_contact: tuple[frozenset[int], ...]
+
+    @property
+    def touching(self) -> frozenset[int]:
+        """Numbers of ``hand`` that touch the object at any contact."""
+        return frozenset().union(*self.touching_by_contact)
 
     @property
     def hand_pairs(self) -> tuple[tuple[int, int], ...]:
@@ -56,7 +61,8 @@ def collision_shapes(problem: Problem) -> CollisionShapes:
     """
     hand = _shapes(problem.hand, problem.hand.tree)
     of_object = _shapes(problem.object, problem.object.urdf)
-    return CollisionShapes(hand, of_object, _ignored(hand, problem.hand), _touching(hand, problem))
+    touching = tuple(_touching(hand, problem, contact.frame) for contact in problem.contacts)
+    return CollisionShapes(hand, of_object, _ignored(hand, problem.hand), touching)
 
 
 def _shapes(body: Body, tree: str) -> tuple[Shape, ...]:
@@ -84,18 +90,15 @@ def _ignored(shapes: tuple[Shape, ...], hand: Hand) -> frozenset[tuple[int, int]
     )
 
 
-def _touching(shapes: tuple[Shape, ...], problem: Problem) -> frozenset[int]:
-    """Numbers of the hand's shapes that touch the object."""
+def _touching(shapes: tuple[Shape, ...], problem: Problem, frame: str) -> frozenset[int]:
+    """Numbers of the hand's shapes that touch where a contact is stated on a frame."""
     held = {shape.link for shape in shapes}
     parents = fixed_parents(problem.hand.tree)
-    found: set[int] = set()
-    for frame in {contact.frame for contact in problem.contacts}:
-        link: str | None = frame
-        while link is not None and link not in held:
-            link = parents.get(link)
-        joint = problem.hand.frame(frame)[0]
-        found.update(i for i, s in enumerate(shapes) if (s.joint == joint if link is None else s.link == link))
-    return frozenset(found)
+    link: str | None = frame
+    while link is not None and link not in held:
+        link = parents.get(link)
+    joint = problem.hand.frame(frame)[0]
+    return frozenset(i for i, s in enumerate(shapes) if (s.joint == joint if link is None else s.link == link))
 
 
 def _disabled(hand: Hand) -> set[frozenset[str]]:

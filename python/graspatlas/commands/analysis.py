@@ -11,8 +11,7 @@ import numpy as np
 
 from graspatlas.analysis.densify import Samples, densify
 from graspatlas.analysis.pareto import knee, pareto_front, values_of
-from graspatlas.commands.arguments import Subcommands, path_word
-from graspatlas.commands.charts import chart_named
+from graspatlas.commands.arguments import Subcommands, chart_named, path_word
 from graspatlas.commands.exit_status import FAILED, INTERRUPTED
 from graspatlas.errors import GraspAtlasError
 from graspatlas.paths.path import GraspPath

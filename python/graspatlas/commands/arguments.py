@@ -1,4 +1,4 @@
-"""Words of the command line that argparse turns into what they mean, or refuses."""
+"""Words of the command line, turned into what they mean or refused: paths, charts of a result."""
 
 from __future__ import annotations
 
@@ -6,7 +6,14 @@ import argparse
 from pathlib import Path
 from typing import TypeAlias
 
-__all__ = ["Subcommands", "path_word"]
+from graspatlas.errors import GraspAtlasError
+from graspatlas.result.result import Result
+from graspatlas.support.validation import shown
+
+__all__ = ["Subcommands", "chart_named", "path_word"]
+
+#: Number of a chart [digits].
+LONGEST_NUMBER = 18
 
 #: What the commands are added to.
 Subcommands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
@@ -21,3 +28,14 @@ def path_word(word: str) -> Path:
     if not word:
         raise argparse.ArgumentTypeError("the path is empty; name a place, or leave the option out")
     return Path(word)
+
+
+def chart_named(result: Result, name: str) -> int:
+    """The chart that a word names."""
+    if name == "first":
+        return 0
+    if name in ("best", "worst"):
+        return int(getattr(result, name).chart)
+    if name.isascii() and name.isdigit() and len(name) <= LONGEST_NUMBER:
+        return int(name)
+    raise GraspAtlasError(f"{shown(name)} names no grasp; give the number of a chart, or first, best or worst")

@@ -6,10 +6,11 @@ import argparse
 import json
 import sys
 
-from graspatlas.commands.arguments import Subcommands, path_word
-from graspatlas.commands.charts import chart_named
+from graspatlas.commands.arguments import Subcommands, chart_named, path_word
 from graspatlas.commands.exit_status import FAILED
 from graspatlas.errors import GraspAtlasError
+from graspatlas.execution.pregrasp import DISTANCE
+from graspatlas.formats.export import FORMATS, export_grasps
 from graspatlas.result.result import load_result
 from graspatlas.support.columns import FRAME_ENDINGS, save_frame
 from graspatlas.support.terminal import say
@@ -38,6 +39,8 @@ def add_result_commands(commands: Subcommands) -> None:
     out.add_argument(
         "--grasps", type=path_word, metavar="FILE", help="write joints, poses and contacts (.json or .csv)"
     )
+    out.add_argument("--format", metavar="NAME", help=f"write grasps with pregrasp and squeeze: {', '.join(FORMATS)}")
+    out.add_argument("--to", type=path_word, metavar="PATH", help="where to: a file, or of dexgraspbench a folder")
     out.add_argument("--best", type=int, metavar="N", help="only the N best grasps that meet the requirements")
     out.add_argument("--chart", nargs="+", metavar="CHART", help="only these: numbers of charts, first, best or worst")
     out.add_argument(
@@ -75,10 +78,12 @@ def _view(options: argparse.Namespace) -> int:
 
 
 def _export(options: argparse.Namespace) -> int:
-    if not options.grasps and not options.table:
-        raise GraspAtlasError("nothing to write: give --grasps FILE or --table FILE")
-    if options.pregrasp is not None and not options.grasps:
-        raise GraspAtlasError("--pregrasp adds postures to a file of grasps: give --grasps FILE too")
+    if not options.grasps and not options.table and not options.format:
+        raise GraspAtlasError("nothing to write: give --grasps FILE, --table FILE, or --format NAME --to PATH")
+    if bool(options.format) != bool(options.to):
+        raise GraspAtlasError("--format NAME says how to write and --to PATH where: give both")
+    if options.pregrasp is not None and not options.grasps and not options.format:
+        raise GraspAtlasError("--pregrasp is for grasps: give --grasps FILE, or --format NAME --to PATH too")
     if options.table and options.table.suffix not in FRAME_ENDINGS:
         raise GraspAtlasError(f"table '{options.table}' must end in {' or '.join(FRAME_ENDINGS)}")
     result = load_result(options.result)
@@ -86,11 +91,16 @@ def _export(options: argparse.Namespace) -> int:
         say(f"{result.problem.name}: no grasp meets the requirements, nothing was written", file=sys.stderr)
         return FAILED
     summary: PlainTable = {"problem": result.problem.name, "n_charts": result.atlas.n_charts}
+    charts = options.chart and [chart_named(result, name) for name in options.chart]
     if options.grasps:
-        charts = options.chart and [chart_named(result, name) for name in options.chart]
         chosen = {name: getattr(options, name) for name in ("best", "accepted", "refined", "pregrasp")}
         count = result.save_grasps(options.grasps, charts=charts, **chosen)
         summary |= {"n_grasps": count, "grasps": str(options.grasps)}
+    if options.format:
+        chosen = {"charts": charts, "best": options.best, "refined": options.refined}
+        distance = DISTANCE if options.pregrasp is None else options.pregrasp
+        handed = export_grasps(result, options.to, options.format, distance=distance, **chosen)
+        summary |= {"format": options.format, "n_handed_over": handed, "to": str(options.to)}
     if options.table:
         save_frame(result.to_pandas(), options.table)
         summary["table"] = str(options.table)
@@ -99,6 +109,8 @@ def _export(options: argparse.Namespace) -> int:
         return 0
     if options.grasps:
         say(f"{result.problem.name}: {count} of {result.atlas.n_charts} grasps written to {options.grasps}")
+    if options.format:
+        say(f"{result.problem.name}: {handed} grasps written to {options.to} as {options.format}")
     if options.table:
         say(f"{result.problem.name}: {result.atlas.n_charts} charts written to {options.table}")
     return 0

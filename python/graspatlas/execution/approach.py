@@ -22,6 +22,8 @@ __all__ = ["Approach", "approach"]
 FINE = 1001
 #: A trajectory has at most so many points.
 MOST_POINTS = 1_000_000
+#: By how much a joint may be faster between two of them.
+UNSEEN = 1.001
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +138,7 @@ def _timed(joints: Sequence[str], urdf: str, line: Array, seconds: float, time_s
     share = np.linspace(0.0, 1.0, FINE)
     passed = _at(line, _smooth(share))
     limits = velocity_limits(urdf)
-    speeds = np.abs(np.diff(passed, axis=0)).max(axis=0) * (FINE - 1)  # if it took one second
+    speeds = UNSEEN * np.abs(np.diff(passed, axis=0)).max(axis=0) * (FINE - 1)  # if it took one second
     needed = {name: speed / limits[name] for name, speed in zip(joints, speeds, strict=True) if name in limits}
     slowed_by = tuple(name for name, least in needed.items() if least > seconds)
     seconds = max([seconds, *(needed[name] for name in slowed_by)])

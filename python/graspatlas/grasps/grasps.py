@@ -17,10 +17,10 @@ from scipy.spatial.transform import Rotation
 from typing_extensions import Unpack
 
 from graspatlas import _core
-from graspatlas.execution.approach import Approach, approach
-from graspatlas.execution.pregrasp import DISTANCE, Pregrasp, pregrasps
 from graspatlas.errors import GraspAtlasError
+from graspatlas.execution.approach import Approach, approach
 from graspatlas.execution.contact_forces import ContactForces, ForceOptions, contact_forces
+from graspatlas.execution.pregrasp import DISTANCE, Pregrasp, pregrasps
 from graspatlas.execution.squeeze import Stiffness, squeeze
 from graspatlas.support.arrays import Array
 from graspatlas.support.pickling import Light
@@ -140,6 +140,45 @@ class Grasp:
         """
         return {name: T[0] for name, T in Grasps(self.problem, self.x).poses(frames).items()}
 
+    def contact_forces(self, **options: Unpack[ForceOptions]) -> ContactForces:
+        """Forces with which the contacts hold the object, farthest from their friction cones, and the joint torques.
+
+        Args:
+            **options: ``normal_force`` [N], ``friction``, ``torsional`` [m], ``load`` and ``within_efforts``; see
+                :class:`graspatlas.execution.ForceOptions`.
+
+        Raises:
+            GraspAtlasError: If no forces inside the friction cones hold the object, or an option is out of its range.
+        """
+        forces = Grasps(self.problem, self.x).contact_forces(**options)[0]
+        if forces.margin > 0.0:
+            return forces
+        mu = f"{forces.friction:g}"
+        given = f"friction {mu} and torsional {forces.torsional:g}"
+        if options.get("load") is not None:
+            raise GraspAtlasError(
+                f"no contact forces balance this load with {given} and normal forces that add up to "
+                f"{forces.total_normal_force:g} N (margin 0); raise normal_force, or take a grasp of force closure"
+            )
+        raise GraspAtlasError(
+            f"this grasp has no force closure with {given} (margin 0), so no contact forces hold it; state the "
+            f"friction there is, for soft fingers torsional=... [m], or require=['force_closure:{mu}:0.02']"
+        )
+
+    def squeeze(self, stiffness: Stiffness, **options: Unpack[ForceOptions]) -> dict[str, float]:
+        """Joint targets by name [rad or m] with which position actuators exert the contact forces.
+
+        Args:
+            stiffness: Of the actuators [N m/rad], of joints that slide [N/m]; one for all, or by actuated joint.
+            **options: Which contact forces; see :meth:`contact_forces`.
+
+        Raises:
+            GraspAtlasError: If no forces inside the friction cones hold the object, or an argument is wrong.
+        """
+        forces, at = self.contact_forces(**options), {j: np.float64(q) for j, q in self.joint_positions.items()}
+        targets = squeeze(self.problem.hand, at, forces, stiffness)
+        return {name: float(target) for name, target in targets.items()}
+
     def pregrasp(self, distance: float = DISTANCE, *, touch_depth: float = 0.002, clearance: float = 0.0) -> Pregrasp:
         """The posture of the hand before this grasp: each contact point off the object by the same distance.
 
@@ -196,44 +235,6 @@ class Grasp:
         """
         start = self.pregrasp(distance, touch_depth=touch_depth, clearance=clearance)
         return approach(start, seconds, time_step=time_step, squeeze=squeeze, squeeze_seconds=squeeze_seconds)
-    def contact_forces(self, **options: Unpack[ForceOptions]) -> ContactForces:
-        """Forces with which the contacts hold the object, farthest from their friction cones, and the joint torques.
-
-        Args:
-            **options: ``normal_force`` [N], ``friction``, ``torsional`` [m], ``load`` and ``within_efforts``; see
-                :class:`graspatlas.execution.ForceOptions`.
-
-        Raises:
-            GraspAtlasError: If no forces inside the friction cones hold the object, or an option is out of its range.
-        """
-        forces = Grasps(self.problem, self.x).contact_forces(**options)[0]
-        if forces.margin > 0.0:
-            return forces
-        mu = f"{forces.friction:g}"
-        given = f"friction {mu} and torsional {forces.torsional:g}"
-        if options.get("load") is not None:
-            raise GraspAtlasError(
-                f"no contact forces balance this load with {given} and normal forces that add up to "
-                f"{forces.total_normal_force:g} N (margin 0); raise normal_force, or take a grasp of force closure"
-            )
-        raise GraspAtlasError(
-            f"this grasp has no force closure with {given} (margin 0), so no contact forces hold it; state the "
-            f"friction there is, for soft fingers torsional=... [m], or require=['force_closure:{mu}:0.02']"
-        )
-
-    def squeeze(self, stiffness: Stiffness, **options: Unpack[ForceOptions]) -> dict[str, float]:
-        """Joint targets by name [rad or m] with which position actuators exert the contact forces.
-
-        Args:
-            stiffness: Of the actuators [N m/rad], of joints that slide [N/m]; one for all, or by actuated joint.
-            **options: Which contact forces; see :meth:`contact_forces`.
-
-        Raises:
-            GraspAtlasError: If no forces inside the friction cones hold the object, or an argument is wrong.
-        """
-        forces, at = self.contact_forces(**options), {j: np.float64(q) for j, q in self.joint_positions.items()}
-        targets = squeeze(self.problem.hand, at, forces, stiffness)
-        return {name: float(target) for name, target in targets.items()}
 
     def __str__(self) -> str:
         angles = ", ".join(f"{name} {value:.3f}" for name, value in self.joint_positions.items())
@@ -383,6 +384,22 @@ class Grasps(Light):
         """Ascending semi-axes of the manipulability ellipsoid [n, 6], lengths in millimetres."""
         return read_only(np.asarray(_core.semi_axes(self.system, self.x, self.LENGTH_UNIT)))
 
+    def contact_forces(self, **options: Unpack[ForceOptions]) -> ContactForces:
+        """Contact forces of all grasps, NaN for those that cannot hold; see :meth:`Grasp.contact_forces`.
+
+        Raises:
+            GraspAtlasError: If an option is out of its range.
+        """
+        return contact_forces(self.problem, self.system, self.x, **options)
+
+    def squeeze(self, stiffness: Stiffness, **options: Unpack[ForceOptions]) -> dict[str, Array]:
+        """Joint targets by name, (n,) each, NaN for grasps that cannot hold; see :meth:`Grasp.squeeze`.
+
+        Raises:
+            GraspAtlasError: If an argument is wrong.
+        """
+        return squeeze(self.problem.hand, self.joint_positions, self.contact_forces(**options), stiffness)
+
     def pregrasps(
         self,
         distance: float = DISTANCE,
@@ -404,21 +421,6 @@ class Grasps(Light):
         """
         depths = {"touch_depth": touch_depth, "clearance": clearance}
         return pregrasps(self.problem, self.x, distance, **depths, progress=progress)
-    def contact_forces(self, **options: Unpack[ForceOptions]) -> ContactForces:
-        """Contact forces of all grasps, NaN for those that cannot hold; see :meth:`Grasp.contact_forces`.
-
-        Raises:
-            GraspAtlasError: If an option is out of its range.
-        """
-        return contact_forces(self.problem, self.system, self.x, **options)
-
-    def squeeze(self, stiffness: Stiffness, **options: Unpack[ForceOptions]) -> dict[str, Array]:
-        """Joint targets by name, (n,) each, NaN for grasps that cannot hold; see :meth:`Grasp.squeeze`.
-
-        Raises:
-            GraspAtlasError: If an argument is wrong.
-        """
-        return squeeze(self.problem.hand, self.joint_positions, self.contact_forces(**options), stiffness)
 
     def __getitem__(self, i: int) -> Grasp:
         one = Grasps(self.problem, self.x[i], self.system) if len(self) > 1 else self  # computed for this grasp alone

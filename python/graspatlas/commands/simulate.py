@@ -1,0 +1,108 @@
+"""The command graspatlas simulate: trials of grasps in MuJoCo."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from graspatlas.commands.arguments import Subcommands, chart_named, path_word
+from graspatlas.commands.exit_status import FAILED, INTERRUPTED
+from graspatlas.errors import GraspAtlasError
+from graspatlas.result.result import load_result
+from graspatlas.simulation.outcome import Simulation
+from graspatlas.simulation.protocols import PROTOCOLS
+from graspatlas.simulation.self_test import KNOWN_PROBLEM, self_test
+from graspatlas.simulation.simulate import simulate
+from graspatlas.support.terminal import say
+
+__all__ = ["add_simulate_command"]
+
+
+def add_simulate_command(commands: Subcommands) -> None:
+    """Add simulate to the subcommands of a parser."""
+    trial = commands.add_parser("simulate", help="try grasps of a result in MuJoCo: close the hand, push the object")
+    trial.add_argument("result", type=path_word, nargs="?", help="folder or file that optimize wrote")
+    trial.add_argument("--protocol", default="dexgraspbench", metavar="NAME", help=f"one of {', '.join(PROTOCOLS)}")
+    trial.add_argument(
+        "--chart", nargs="+", metavar="CHART", help="only these: numbers of charts, first, best or worst"
+    )
+    trial.add_argument("--sample", type=int, metavar="N", help="also N accepted charts, chosen at random")
+    trial.add_argument("--all", action="store_true", help="also all charts that meet the result's requirements")
+    trial.add_argument(
+        "--breaking", action="store_true", help="find the breaking force of each, not of the first alone"
+    )
+    trial.add_argument("--distance", type=float, default=0.01, metavar="M", help="of the pregrasp from the object [m]")
+    trial.add_argument(
+        "--force", type=float, default=5.0, metavar="N", help="that squeezes, in the mean of contacts [N]"
+    )
+    trial.add_argument("--seed", type=int, default=0, metavar="N", help="of the random sample; 0 by default")
+    trial.add_argument("--self-test", action="store_true", help="try a grasp whose outcome is known instead")
+    trial.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    trial.set_defaults(run=_simulate)
+
+
+def _simulate(options: argparse.Namespace) -> int:
+    if options.self_test:
+        return _self_test()
+    if options.result is None:
+        raise GraspAtlasError("name the folder or file that optimize wrote, or give --self-test")
+    result = load_result(options.result)
+    trials = simulate(
+        result,
+        protocol=options.protocol,
+        charts=options.chart and [chart_named(result, name) for name in options.chart],
+        sample=options.sample,
+        everything=options.all,
+        distance=options.distance,
+        normal_force=options.force,
+        breaking=options.breaking,
+        seed=options.seed,
+    )
+    place = _place(options.result, trials)
+    trials.save(place)
+    if options.json:
+        say(json.dumps(trials.summary()))
+    else:
+        _report(trials)
+        say(f"stored in {place}")
+    return 0 if trials.complete else INTERRUPTED
+
+
+def _place(result: Path, trials: Simulation) -> Path:
+    """Where trials of a result are stored: in its folder, or beside its file."""
+    name = f"simulation-{trials.protocol}.json"
+    return result / name if result.is_dir() else result.with_name(f"{result.stem}-{name}")
+
+
+def _report(trials: Simulation) -> None:
+    first = trials.trial(0)
+    what = "the refined best" if first["refined"] else f"chart {first['chart']}"
+    say(f"{trials.problem}, {trials.protocol}: {what} survived {first['survived']} of {first['of']} pushes")
+    fell = f"; lost while {first['lost_while']}" if first["lost_while"] else ""
+    say(f"  the object moved {first['shift_mm']:.2g} mm and turned {first['turn_deg']:.2g} degrees at most{fell}")
+    if first["breaking_direction"] is not None:
+        along = ", ".join(f"{value:.2f}" for value in first["breaking_direction"])
+        force = first["breaking_force_n"]
+        say(f"  it was lost under a growing push of {force:.2f} N along ({along}) of the palm")
+    distances = ", ".join(f"{name} {value:.3f}" for name, value in first["contact_distance_mm"].items())
+    penetration = first["penetration_mm"]
+    say(f"  at the start: distance of contacts {distances} mm; penetration {penetration:.3f} mm")
+    if not first["pregrasp_reached"]:
+        say("  the pregrasp was nearer than asked: see grasp.pregrasp(...).reason")
+    if len(trials) > 1:
+        lost = int(trials.lost_closing.sum())
+        say(f"  of {len(trials)} grasps {int(trials.held.sum())} survived all pushes; {lost} were lost while closing")
+    say(f"  {trials.seconds:.1f} s" + ("" if trials.complete else "; interrupted"))
+
+
+def _self_test() -> int:
+    held, lost, passed = self_test()
+    say(f"{KNOWN_PROBLEM}, first grasp: survived {int(held.survived.sum())} of {held.survived.size}, expected all")
+    say(f"on ice: survived {int(lost.survived.sum())} of {lost.survived.size}, expected none")
+    say(
+        "self-test passed" if passed else "self-test failed: this MuJoCo behaves differently; trust no trial",
+        file=sys.stderr,
+    )
+    return 0 if passed else FAILED
