@@ -6,6 +6,7 @@ import json
 import signal
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +58,16 @@ def test_the_refined_best_is_tried_where_there_is_one() -> None:
     trial = ga.simulate(result)
     assert trial.refined.tolist() == [True]
     assert trial.trial(0)["refined"]
+
+
+def test_stated_contacts_are_those_of_the_requirement(result: ga.Result) -> None:
+    trials = ga.simulate(result, stated_contacts=True)
+    assert (trials.friction, trials.torsional) == (0.5, 0.0)
+    assert trials.breaking_forces[0] < ga.simulate(result).breaking_forces[0]
+    soft = ga.simulate(replace(result, requirements=(ga.ForceClosure(0.7, 0.0, 0.004),)), stated_contacts=True)
+    assert (soft.friction, soft.torsional) == (0.7, 0.004)
+    with pytest.raises(ga.GraspAtlasError, match="no force_closure"):
+        ga.simulate(replace(result, requirements=()), stated_contacts=True)
 
 
 def test_trials_are_stored_and_read_again(trials: ga.Simulation, tmp_path: Path) -> None:

@@ -28,6 +28,9 @@ def add_simulate_command(commands: Subcommands) -> None:
     trial.add_argument(
         "--chart", nargs="+", metavar="CHART", help="only these: numbers of charts, first, best or worst"
     )
+    trial.add_argument(
+        "--stated-contacts", action="store_true", help="with the friction that the result's force_closure states"
+    )
     trial.add_argument("--sample", type=int, metavar="N", help="also N accepted charts, chosen at random")
     trial.add_argument("--all", action="store_true", help="also all charts that meet the result's requirements")
     trial.add_argument(
@@ -52,6 +55,7 @@ def _simulate(options: argparse.Namespace) -> int:
     trials = simulate(
         result,
         protocol=options.protocol,
+        stated_contacts=options.stated_contacts,
         charts=options.chart and [chart_named(result, name) for name in options.chart],
         sample=options.sample,
         everything=options.all,

@@ -12,12 +12,14 @@ from graspatlas.formats.hand_over import HandOver, hand_over
 from graspatlas.formats.isaac_grasp import write_isaac_grasp
 from graspatlas.formats.mjcf_scene import write_mjcf
 from graspatlas.formats.moveit import write_moveit
-from graspatlas.requirements.force_closure import ForceClosure
+from graspatlas.requirements.force_closure import stated_friction
 from graspatlas.result.exports import select
 from graspatlas.result.grasp_atlas import GraspAtlas, check_is_result
 
 __all__ = ["FORMATS", "export_grasps"]
 
+#: Coefficient of friction where no requirement states one.
+FRICTION = 0.5
 #: What writes each format.
 FORMATS: dict[str, Callable[[HandOver, Path], None]] = {
     "isaac_grasp": write_isaac_grasp,
@@ -69,7 +71,7 @@ def export_grasps(
     if format not in FORMATS:
         raise unknown_name("format", format, FORMATS)
     chosen = select(result, charts=charts, best=1 if charts is None and best is None else best, refined=refined)
-    stated = stated_friction(result)
+    stated = stated_friction(result.requirements) or (FRICTION, 0.0)
     grasps = hand_over(
         chosen,
         distance=distance,
@@ -80,11 +82,3 @@ def export_grasps(
     )
     FORMATS[format](grasps, Path(path))
     return len(grasps)
-
-
-def stated_friction(result: GraspAtlas) -> tuple[float, float]:
-    """Coefficient of friction and torsional friction [m] that a result's requirements state; 0.5 and 0 without one."""
-    for requirement in result.requirements:
-        if isinstance(requirement, ForceClosure):
-            return requirement.friction, requirement.torsional
-    return 0.5, 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -13,7 +14,7 @@ from graspatlas.grasps.grasps import Grasps
 from graspatlas.requirements.base import Requirement, Slacks
 from graspatlas.support.arrays import Array, BoolArray
 
-__all__ = ["ForceClosure"]
+__all__ = ["ForceClosure", "stated_friction"]
 
 
 @dataclass(frozen=True)
@@ -55,3 +56,15 @@ class ForceClosure(Requirement):
             return np.maximum(signed, -1.0)[:, None] - self.margin
 
         return slacks
+
+
+def stated_friction(requirements: Sequence[object]) -> tuple[float, float] | None:
+    """Coefficient of friction and torsional friction [m] of the first force closure among requirements; None if none.
+
+    Args:
+        requirements: Such as those of a result.
+    """
+    for requirement in requirements:
+        if isinstance(requirement, ForceClosure):
+            return requirement.friction, requirement.torsional
+    return None

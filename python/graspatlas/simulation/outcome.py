@@ -43,6 +43,8 @@ class SimulationSummary(TypedDict):
 
     problem: str
     protocol: str
+    friction: float
+    torsional: float
     distance: float
     normal_force: float
     seed: int
@@ -62,6 +64,8 @@ class Simulation:
     Attributes:
         problem: Name of the problem.
         protocol: Name of the protocol.
+        friction: Coefficient of friction in the trials.
+        torsional: Torsional friction in the trials [m].
         distance: From the object at which the fingertips began [m].
         normal_force: With which the fingers squeezed, in the mean of the contacts [N].
         seed: By which grasps were chosen at random.
@@ -87,6 +91,8 @@ class Simulation:
 
     problem: str
     protocol: str
+    friction: float
+    torsional: float
     distance: float
     normal_force: float
     seed: int
@@ -154,6 +160,8 @@ class Simulation:
         return {
             "problem": self.problem,
             "protocol": self.protocol,
+            "friction": self.friction,
+            "torsional": self.torsional,
             "distance": self.distance,
             "normal_force": self.normal_force,
             "seed": self.seed,

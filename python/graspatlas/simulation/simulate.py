@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasps
+from graspatlas.requirements.force_closure import stated_friction
 from graspatlas.result.grasp_atlas import GraspAtlas, check_is_result
 from graspatlas.simulation.motion import plan
 from graspatlas.simulation.outcome import Simulation
@@ -30,6 +32,7 @@ def simulate(
     result: GraspAtlas,
     *,
     protocol: str | Protocol = "dexgraspbench",
+    stated_contacts: bool = False,
     charts: Sequence[int] | None = None,
     sample: int | None = None,
     everything: bool = False,
@@ -47,6 +50,8 @@ def simulate(
     Args:
         result: The result.
         protocol: Its name, one of ``graspatlas.simulation.PROTOCOLS``, or one of your own.
+        stated_contacts: Take the friction, and the torsional friction of soft fingers, that the result's requirement
+            force_closure states, in place of the protocol's.
         charts: Only these charts, in this order, and not the best.
         sample: Also so many charts that meet the requirements, chosen at random; all of them where there are fewer.
         everything: Also all charts that meet the requirements.
@@ -65,6 +70,9 @@ def simulate(
             or no grasp meets the requirements.
     """
     check_is_result(result)
+    chosen = find_protocol(protocol)
+    if stated_contacts:
+        chosen = _with_stated_contacts(chosen, result)
     if (charts is not None) + (sample is not None) + everything > 1:
         raise GraspAtlasError("give only one of charts, sample and everything")
     refined, numbers = _chosen(result, charts, sample, everything, seed)
@@ -74,7 +82,7 @@ def simulate(
     grasps = Grasps(result.problem, X, charts=numbers)
     return simulate_grasps(
         grasps,
-        protocol=protocol,
+        protocol=chosen,
         distance=distance,
         normal_force=normal_force,
         breaking=breaking,
@@ -82,6 +90,14 @@ def simulate(
         seed=seed,
         progress=progress,
     )
+
+
+def _with_stated_contacts(protocol: Protocol, result: GraspAtlas) -> Protocol:
+    """The protocol with the friction of a result's requirement force_closure."""
+    stated = stated_friction(result.requirements)
+    if stated is None:
+        raise GraspAtlasError("this result requires no force_closure, which would state the friction: leave it out")
+    return replace(protocol, friction=stated[0], torsional=stated[1])
 
 
 def _chosen(
@@ -139,6 +155,8 @@ def simulate_grasps(
     return Simulation(
         problem=grasps.problem.name,
         protocol=chosen.name,
+        friction=chosen.friction,
+        torsional=chosen.torsional,
         distance=distance,
         normal_force=normal_force,
         seed=seed,
