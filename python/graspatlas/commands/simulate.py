@@ -94,7 +94,7 @@ def _report(trials: Simulation) -> None:
     penetration = first["penetration_mm"]
     say(f"  at the start: distance of contacts {distances} mm; penetration {penetration:.3f} mm")
     if not first["pregrasp_reached"]:
-        say("  the pregrasp was nearer than asked: see grasp.pregrasp(...).reason")
+        say(f"  the fingertips began {first['pregrasp_mm']:.1f} mm off: farther they cannot; grasp.pregrasp() says why")
     if len(trials) > 1:
         lost = int(trials.lost_closing.sum())
         say(f"  of {len(trials)} grasps {int(trials.held.sum())} survived all pushes; {lost} were lost while closing")

@@ -29,7 +29,8 @@ class Motion:
         squeezing: Targets at each step from there to where the servos press (n, steps, a).
         squeeze: These last targets (n, a).
         closes: Whether friction of the protocol closes each grasp (n,); else the forces are those for more friction.
-        reached: Whether each pregrasp is as far off as was asked (n,).
+        distances: How far off the object each pregrasp is (n,), metres.
+        reached: Whether that is as far as was asked (n,).
     """
 
     grasps: Grasps
@@ -38,6 +39,7 @@ class Motion:
     squeezing: Array
     squeeze: Array
     closes: BoolArray
+    distances: Array
     reached: BoolArray
 
     def __len__(self) -> int:
@@ -76,6 +78,7 @@ def plan(scene: Scene, grasps: Grasps, distance: float, normal_force: float) -> 
         squeezing=at_grasp[:, None] + shares * (squeeze - at_grasp)[:, None],
         squeeze=squeeze,
         closes=closes,
+        distances=np.array([posture.distances.min() for posture in before]),
         reached=np.array([posture.reached for posture in before]),
     )
 

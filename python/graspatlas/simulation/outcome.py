@@ -32,6 +32,7 @@ class TrialRecord(TypedDict):
     closing_shift_mm: float
     contact_distance_mm: dict[str, float]
     penetration_mm: float
+    pregrasp_mm: float
     pregrasp_reached: bool
     force_closed: bool
     breaking_force_n: float | None
@@ -80,7 +81,8 @@ class Simulation:
         lost_closing: Whether it was lost while the hand closed (n,).
         contact_distances: Of each contact's shapes before closing (n, m), metres; negative where they overlap.
         depths: Deepest overlap of hand and object before closing (n,), metres.
-        reached: Whether the pregrasp was as far off as was asked (n,).
+        pregrasp_distances: How far off the object the fingertips began (n,), metres.
+        reached: Whether that was as far as was asked (n,).
         closes: Whether friction of the protocol closes the grasp (n,).
         breaking_forces: Smallest growing push that the object was lost under (n,), newtons; NaN where not asked for,
             inf where none did.
@@ -107,6 +109,7 @@ class Simulation:
     lost_closing: BoolArray
     contact_distances: Array
     depths: Array
+    pregrasp_distances: Array
     reached: BoolArray
     closes: BoolArray
     breaking_forces: Array
@@ -144,6 +147,7 @@ class Simulation:
             "closing_shift_mm": 1e3 * float(self.closing_shifts[i]),
             "contact_distance_mm": dict(zip(self.contacts, (1e3 * self.contact_distances[i]).tolist(), strict=True)),
             "penetration_mm": 1e3 * float(self.depths[i]),
+            "pregrasp_mm": 1e3 * float(self.pregrasp_distances[i]),
             "pregrasp_reached": bool(self.reached[i]),
             "force_closed": bool(self.closes[i]),
             "breaking_force_n": breaking if np.isfinite(breaking) else None,
@@ -212,6 +216,7 @@ _NUMBERS = (
     "closing_shifts",
     "contact_distances",
     "depths",
+    "pregrasp_distances",
     "breaking_forces",
     "breaking_directions",
 )

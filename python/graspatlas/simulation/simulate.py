@@ -197,6 +197,7 @@ def _tried(
         "lost_closing": ~closed.held,
         "contact_distances": start.contact_distances,
         "depths": start.depths,
+        "pregrasp_distances": motion.distances,
         "reached": motion.reached,
         "closes": motion.closes,
         "breaking_forces": forces,
