@@ -161,6 +161,15 @@ def test_the_command_refuses_what_it_cannot_do(result: ga.Result, tmp_path: Path
     assert (status, "shake" in err) == (2, True)
 
 
+def test_the_command_tries_nothing_where_no_grasp_will_do(result: ga.Result, tmp_path: Path, cli: Cli) -> None:
+    none = replace(result, accepted=np.zeros(result.atlas.n_charts, bool))
+    none.save(tmp_path / "none.npz")
+    status, out, err = cli("simulate", tmp_path / "none.npz")
+    assert (status, out) == (1, "")
+    assert "no grasp meets the requirements" in err
+    assert cli("simulate", tmp_path / "none.npz", "--chart", 0)[0] == 0
+
+
 def test_the_command_without_mujoco(
     result: ga.Result, tmp_path: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
