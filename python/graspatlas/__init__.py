@@ -42,6 +42,7 @@ from graspatlas.result.refinement import Refinement
 from graspatlas.result.result import Result, load_result
 from graspatlas.search.grasp_search import find_grasps
 from graspatlas.simulation.outcome import Simulation, load_simulation
+from graspatlas.simulation.recording import Recording, record
 from graspatlas.simulation.simulate import simulate
 from graspatlas.systems.projection import project
 from graspatlas.systems.system import System
@@ -55,6 +56,7 @@ if typing.TYPE_CHECKING:
         plot_climbs,
         plot_ellipsoid,
         plot_growth,
+        plot_holding,
         plot_local_maxima,
         plot_pareto,
         plot_planar_grasp,
@@ -86,6 +88,7 @@ __all__ = [
     "PoseGuess",
     "Pregrasp",
     "Problem",
+    "Recording",
     "Refinement",
     "Result",
     "Samples",
@@ -116,12 +119,14 @@ __all__ = [
     "plot_climbs",
     "plot_ellipsoid",
     "plot_growth",
+    "plot_holding",
     "plot_local_maxima",
     "plot_pareto",
     "plot_planar_grasp",
     "plot_planar_indices",
     "project",
     "quality",
+    "record",
     "refine",
     "save_picture",
     "shortest_path",

@@ -6,6 +6,7 @@ import csv
 import json
 import re
 import subprocess
+import sys
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -144,6 +145,48 @@ def test_starts_in_a_box(small_result: ga.Result, monkeypatch: pytest.MonkeyPatc
     assert sum(ends) == found["starts"] > 0
     share = found["starts that reached the best chart"] / found["starts"]
     assert part.claims[0].found.startswith("It is so here" if share < 0.5 else "It is not so here")
+
+
+# Simulation
+
+
+def test_grasps_that_are_tried_in_simulation(can_result: ga.Result) -> None:
+    from graspatlas.reproduce.holds import _tried
+
+    tried = {one.name: one for one in _tried(can_result)}
+    free = ga.CollisionFree().met(ga.Grasps(can_result.problem, can_result.atlas.centers))
+    assert [bool(free[one.grasp.chart]) for one in tried.values()] == [False, True, True, True, True]
+    volume, force = (
+        {end: tried[f"{end} by {index}, free of collision"] for end in ("worst", "best")}
+        for index in ("volume", "holding force")
+    )
+    assert volume["worst"].volume == pytest.approx(can_result.qualities[free].min())
+    assert volume["best"].volume == pytest.approx(can_result.qualities[free].max())
+    assert force["worst"].holding == 0.0
+    assert force["best"].holding > max(one.holding for one in volume.values()) > 0.0
+    assert tried["best by volume, nothing required"].grasp.chart == can_result.best.chart
+
+
+def test_without_mujoco_it_is_said_that_nothing_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    part = EXPERIMENTS["holds"](False)
+    assert part.text == "Not tried. MuJoCo is not installed: pip install 'graspatlas[mujoco]'"
+    assert (part.numbers, part.plates) == ([], [])
+
+
+@pytest.mark.slow
+def test_the_best_by_holding_force_holds_best(tmp_path: Path) -> None:
+    text = reproduce(tmp_path / "report", "holds", progress=False).read_text(encoding="utf-8")
+    found = json.loads((tmp_path / "report" / "numbers.json").read_text(encoding="utf-8"))["numbers"]
+    pushes = {n["run"]: n["here"] for n in found if n["quantity"].startswith("smallest push")}
+    assert pushes["best by volume, nothing required"] == 0.0
+    assert 0.2 < pushes["worst by volume, free of collision"] < 0.6
+    best = pushes["best by holding force, free of collision"]
+    assert best == max(pushes.values())
+    assert best == pytest.approx(4.4, abs=0.5)
+    assert f"lost at {best:.2f} N" in text
+    with Image.open(tmp_path / "report" / "figure_1_holds.png") as image:
+        assert image.size == (1600, 900)
 
 
 # The folder

@@ -15,7 +15,7 @@ from screens import browse, pixels, share
 
 import graspatlas as ga
 from graspatlas.viewer import export_html, save_picture, view
-from graspatlas.viewer.scene.animation import Film
+from graspatlas.viewer.scene.path_film import path_film
 from graspatlas.viewer.web.animation_page import film_animation
 from graspatlas.viewer.web.browser import close
 
@@ -28,10 +28,10 @@ def path(small_result: ga.Result) -> ga.GraspPath:
 
 
 def test_film_shows_the_grasps_of_the_path(path: ga.GraspPath) -> None:
-    film = Film(path, 7)
+    film = path_film(path, 7)
     assert len(film) == 7
-    assert (film.points[0], film.points[-1]) == (0, len(path) - 1)
-    for i, point in enumerate(film.points):
+    assert (film.frames[0], film.frames[-1]) == (0, len(path) - 1)
+    for i, point in enumerate(film.frames):
         parts = film.frame(i)
         balls = [part.T[:3, 3] for part in parts if part.group == "contact"]
         needles = [part.T[:3, 2] for part in parts if part.group == "normal"]
@@ -52,17 +52,17 @@ def test_film_page_carries_every_placement(path: ga.GraspPath, tmp_path: Path) -
     match = re.search(r"^const film = (.*);$", text, re.MULTILINE)
     assert match
     data = json.loads(match[1])
-    film = Film(path)
+    film = path_film(path)
     rows = np.frombuffer(base64.b64decode(data["placements"]), np.float32).reshape(len(film), -1, 4, 3)
     assert_allclose(rows.transpose(0, 1, 3, 2), film.T[:, film.moving, :3], atol=1e-6)
-    assert_allclose(data["qualities"], path.qualities[film.points])
-    assert data["arc_lengths"][-1] == pytest.approx(path.length)
-    assert "accepted" not in data
+    assert_allclose(data["curve"], [path.arc_length[film.frames], path.qualities[film.frames]])
+    assert data["curve"][0][-1] == pytest.approx(path.length)
+    assert {alarm for _, alarm, _ in data["readouts"]} == {""}
     assert len(text) < 6e6
 
 
 def test_meshcat_plays_every_placement(path: ga.GraspPath) -> None:
-    film = Film(path, 20)
+    film = path_film(path, 20)
     animations = film_animation(film)["animations"]
     assert len(animations) == film.moving.sum()
     for animation, part in zip(animations, np.flatnonzero(film.moving), strict=True):
@@ -92,7 +92,7 @@ def test_strip_shows_six_grasps(path: ga.GraspPath, tmp_path: Path) -> None:
 def test_what_has_no_hand_is_not_shown(sphere: ga.Atlas, small_result: ga.Result, tmp_path: Path) -> None:
     with pytest.raises(ga.GraspAtlasError, match="not one of grasps"):
         export_html(ga.shortest_path(sphere, 0, 5), tmp_path / "path.html")
-    with pytest.raises(ga.GraspAtlasError, match=r"only a graspatlas\.Result or a path"):
+    with pytest.raises(ga.GraspAtlasError, match=r"only a graspatlas\.Result, a path"):
         view(small_result.atlas)  # type: ignore[arg-type]
     export_html(ga.shortest_path(small_result, 3, 3), tmp_path / "point.html")
     assert [file.name for file in tmp_path.iterdir()] == ["point.html"]
@@ -118,11 +118,11 @@ def test_slider_moves_the_grasp(path: ga.GraspPath, tmp_path: Path) -> None:
     text = browse(page.as_uri(), tmp_path, "--dump-dom")
     match = re.search(r'<pre id="report">(.*?)</pre>', text)
     assert match
-    film = Film(path)
+    film = path_film(path)
     shown = np.array(json.loads(match[1])).reshape(-1, 4, 4).transpose(0, 2, 1)
     assert_allclose(shown, film.T[17, film.moving], atol=1e-5)
-    assert f"point {film.points[17]} of {len(path) - 1}" in text
-    assert f"arc length {path.arc_length[film.points[17]]:.3f} of {path.length:.3f}" in text
+    assert f"point {film.frames[17]} of {len(path) - 1}" in text
+    assert f"arc length {path.arc_length[film.frames[17]]:.3f} of {path.length:.3f}" in text
 
 
 #: Says how far the page reaches beyond the window while its longest line is shown.
@@ -155,4 +155,4 @@ def test_film_page_opens_at_the_frame_of_its_address(path: ga.GraspPath, tmp_pat
     shown = pixels(screenshot)
     for colour, least in (("yellow", 0.01), ("grey", 0.01), ("red", 0.0001)):
         assert share(shown, colour) > least
-    assert f"point {Film(path).points[30]} of" in browse(address, tmp_path, "--dump-dom")
+    assert f"point {path_film(path).frames[30]} of" in browse(address, tmp_path, "--dump-dom")

@@ -10,9 +10,10 @@ from pathlib import Path
 from graspatlas.commands.arguments import Subcommands, chart_named, path_word
 from graspatlas.commands.exit_status import FAILED, INTERRUPTED
 from graspatlas.errors import GraspAtlasError
-from graspatlas.result.result import load_result
+from graspatlas.result.result import Result, load_result
 from graspatlas.simulation.outcome import Simulation
 from graspatlas.simulation.protocols import PROTOCOLS
+from graspatlas.simulation.recording import record
 from graspatlas.simulation.self_test import KNOWN_PROBLEM, self_test
 from graspatlas.simulation.simulate import simulate
 from graspatlas.support.terminal import say
@@ -41,6 +42,10 @@ def add_simulate_command(commands: Subcommands) -> None:
         "--force", type=float, default=5.0, metavar="N", help="that squeezes, in the mean of contacts [N]"
     )
     trial.add_argument("--seed", type=int, default=0, metavar="N", help="of the random sample; 0 by default")
+    trial.add_argument(
+        "--html", type=path_word, metavar="FILE", help="write a page that plays the first grasp's trial, a growing push"
+    )
+    trial.add_argument("--picture", type=path_word, metavar="FILE", help="write a PNG picture of its moments")
     trial.add_argument("--self-test", action="store_true", help="try a grasp whose outcome is known instead")
     trial.add_argument("--json", action="store_true", help="print one JSON object on standard output")
     trial.set_defaults(run=_simulate)
@@ -69,12 +74,28 @@ def _simulate(options: argparse.Namespace) -> int:
     )
     place = _place(options.result, trials)
     trials.save(place)
+    if options.html or options.picture:
+        _show(result, trials, options)
     if options.json:
         say(json.dumps(trials.summary()))
     else:
         _report(trials)
         say(f"stored in {place}")
     return 0 if trials.complete else INTERRUPTED
+
+
+def _show(result: Result, trials: Simulation, options: argparse.Namespace) -> None:
+    """Write the film of the first grasp."""
+    from graspatlas.viewer import export_html, save_picture  # slow to import
+
+    chart = None if options.chart is None else int(trials.charts[0])
+    film = record(
+        result, chart=chart, protocol=trials.protocol, distance=trials.distance, normal_force=trials.normal_force
+    )
+    for file, write in ((options.html, export_html), (options.picture, save_picture)):
+        if file:
+            write(film, file)
+            say(f"wrote {file}", file=sys.stderr)
 
 
 def _place(result: Path, trials: Simulation) -> Path:
@@ -93,7 +114,7 @@ def _report(trials: Simulation) -> None:
         along = ", ".join(f"{value:.2f}" for value in first["breaking_direction"])
         force = first["breaking_force_n"]
         say(f"  it was lost under a growing push of {force:.2f} N along ({along}) of the palm")
-    distances = ", ".join(f"{name} {value:.3f}" for name, value in first["contact_distance_mm"].items())
+    distances = ", ".join(f"{name} {round(value, 3) + 0.0:.3f}" for name, value in first["contact_distance_mm"].items())
     penetration = first["penetration_mm"]
     say(f"  at the start: distance of contacts {distances} mm; penetration {penetration:.3f} mm")
     if not first["pregrasp_reached"]:

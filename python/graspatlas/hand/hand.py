@@ -236,6 +236,14 @@ class Hand(Body):
                 positions[joint.name] = float(np.arctan2(q[at + 1], q[at]))
         return positions
 
+    def configuration(self, positions: Mapping[str, float]) -> Array:
+        """The joint configuration q (nq,) of joint positions by name [rad or m]; see :meth:`joint_positions`."""
+        q = np.zeros(self.model.hand_q_size)
+        for joint in self.model.hand_joints:
+            at, position = joint.q_index, positions[joint.name]
+            q[at : at + joint.q_size] = position if joint.q_size == 1 else (np.cos(position), np.sin(position))
+        return q
+
     def link_placements(self, q: Array) -> dict[str, Array]:
         """T_palm_link (4, 4) of every link and frame at joint configuration q (nq,)."""
         return {name: np.asarray(T) for name, T in self.model.frame_placements(np.asarray(q, float)).items()}

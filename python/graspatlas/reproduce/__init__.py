@@ -12,8 +12,8 @@ from graspatlas.reproduce.folder import report_folder
 
 __all__ = ["EXPERIMENT_NAMES", "reproduce"]
 
-#: Names of the experiments, in the order of the paper.
-EXPERIMENT_NAMES = ("sphere", "planar_hand", "schunk_can", "schunk_oil_bottle")
+#: Names of the experiments, in the order of the paper; the last is the simulation of its Fig. 1.
+EXPERIMENT_NAMES = ("sphere", "planar_hand", "schunk_can", "schunk_oil_bottle", "holds")
 
 
 def reproduce(output: str | os.PathLike[str], experiment: str | None = None, progress: bool = True) -> Path:

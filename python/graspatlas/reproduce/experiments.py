@@ -16,6 +16,7 @@ from graspatlas.reproduce.findings import (
     more_dimensions_claim,
     variance_claim,
 )
+from graspatlas.reproduce.holds import holds
 from graspatlas.reproduce.report import Claim, Number, Plate, Section
 from graspatlas.reproduce.runs import Setting, numbers_of, run
 from graspatlas.result.result import Result
@@ -261,5 +262,5 @@ def _add_local_search(
 
 #: Experiments by name, in the order of the paper.
 EXPERIMENTS: dict[str, Callable[[bool], Section]] = {
-    function.__name__: function for function in (sphere, planar_hand, schunk_can, schunk_oil_bottle)
+    function.__name__: function for function in (sphere, planar_hand, schunk_can, schunk_oil_bottle, holds)
 }

@@ -118,6 +118,19 @@ class Scene:
             qpos[:, at + 3 : at + 7] = Rotation.from_matrix(R).as_quat()[:, [3, 0, 1, 2]]
         return qpos
 
+    def poses(self, qpos: Array) -> tuple[Array, Array]:
+        """Joint positions (n, h) and poses of the object (n, 4, 4) of MuJoCo's configurations (n, nq)."""
+        columns = [self.model.joint(name).qposadr[0] for name in self.problem.hand.joints]
+        T, at = np.tile(np.eye(4), (len(qpos), 1, 1)), self.object_at
+        if self.problem.object_joint_model.planar:
+            T[:, :2, 3] = qpos[:, at : at + 2]
+            T[:, :3, :3] = Rotation.from_euler("z", qpos[:, at + 2, None]).as_matrix()
+        else:
+            T[:, :3, 3] = qpos[:, at : at + 3]
+            T[:, :3, :3] = Rotation.from_quat(qpos[:, at + 3 : at + 7][:, [1, 2, 3, 0]]).as_matrix()
+        T[:, :3, 3] -= T[:, :3, :3] @ self.center_of_mass
+        return qpos[:, columns], T
+
     @cached_property
     def object_at(self) -> int:
         """Where the object's pose begins in MuJoCo's configuration."""

@@ -135,10 +135,10 @@ class Trials:
     def close(self, motion: Motion) -> Closed:
         """Close the hand: pregrasp, grasp, squeeze, in straight lines."""
         protocol = self.scene.protocol
-        states = self._origins(motion)
+        states = self.origins(motion)
         targets = np.concatenate([motion.closing, motion.squeezing], axis=1)
-        ends = self._run(states, self._controls(targets))[:, -1]
-        shifts, turns = self._moved(ends[:, None], states)
+        ends = self.run(states, self.controls(targets))[:, -1]
+        shifts, turns = self.moved(ends[:, None], states)
         held = (shifts[:, 0] < protocol.shift) & (turns[:, 0] < protocol.turn)
         return Closed(ends, shifts[:, 0], turns[:, 0], held)
 
@@ -146,18 +146,18 @@ class Trials:
         """Push the object as the protocol says."""
         protocol, axes = self.scene.protocol, self.axes
         steps, n, p = round(protocol.seconds / protocol.step), len(motion), len(axes)
-        origin = self._origins(motion)
+        origin = self.origins(motion)
         loads = protocol.force * axes[:, : self.scene.directions]
         if protocol.in_a_row:
             targets = np.repeat(motion.squeeze[:, None, :], p * steps, axis=1)
-            trace = self._run(closed.states, self._controls(targets, np.repeat(loads, steps, axis=0)[None]))
-            shifts, turns = (part.reshape(n, p, steps).max(axis=2) for part in self._moved(trace, origin))
+            trace = self.run(closed.states, self.controls(targets, np.repeat(loads, steps, axis=0)[None]))
+            shifts, turns = (part.reshape(n, p, steps).max(axis=2) for part in self.moved(trace, origin))
             survived = np.logical_and.accumulate((shifts < protocol.shift) & (turns < protocol.turn), axis=1)
         else:
             targets = np.repeat(motion.squeeze, p, axis=0)[:, None, :].repeat(steps, axis=1)
             pushes = np.tile(loads, (n, 1))[:, None, :]
-            trace = self._run(np.repeat(closed.states, p, axis=0), self._controls(targets, pushes))
-            moved = self._moved(trace, np.repeat(origin, p, axis=0))
+            trace = self.run(np.repeat(closed.states, p, axis=0), self.controls(targets, pushes))
+            moved = self.moved(trace, np.repeat(origin, p, axis=0))
             shifts, turns = (part.max(axis=1).reshape(n, p) for part in moved)
             survived = (shifts < protocol.shift) & (turns < protocol.turn)
         return Pushed(survived & closed.held[:, None], shifts, turns)
@@ -184,21 +184,50 @@ class Trials:
             sizes = GROWTH * step * (first + 1 + np.arange(PIECE))
             targets = squeeze[left][:, None, :].repeat(PIECE, axis=1)
             pushes = along[left][:, None, :] * sizes[None, :, None]
-            trace = self._run(states[left], self._controls(targets, pushes))
-            shifts, turns = self._moved(trace, origin[left])
+            trace = self.run(states[left], self.controls(targets, pushes))
+            shifts, turns = self.moved(trace, origin[left])
             lost = (shifts > LOST_SHIFT) | (turns > LOST_TURN)
             gone = lost.any(axis=1)
             forces[left[gone]] = sizes[lost[gone].argmax(axis=1)]
             states[left] = trace[:, -1]
         return forces.reshape(len(motion), d)
 
-    def _origins(self, motion: Motion) -> Array:
+    def contacts(self, states: Array, controls: Array) -> tuple[Array, Array]:
+        """Forces on the object in states (n, s) under controls (n, a + d), by the links that the contacts name.
+
+        Returns:
+            Forces in the palm's frame (n, m, 3), newtons, and where they act in the mean (n, m, 3), NaN for none. Of
+            contacts that share a shape the first has it.
+        """
+        library, model, data = self._library, self._model, self._data[0]
+        touching = self.scene.touching_shapes
+        contact_of = {model.geom(HAND + name).id: m for m in reversed(range(len(touching))) for name in touching[m]}
+        body = model.body("object").id
+        forces, places = np.zeros((2, len(states), len(touching), 3))
+        weights, local = np.zeros((len(states), len(touching), 1)), np.zeros(6)
+        for n, (state, control) in enumerate(zip(states, controls, strict=True)):
+            library.mj_setState(model, data, state, self._spec)
+            data.ctrl[:] = control
+            library.mj_forward(model, data)
+            for i, contact in enumerate(data.contact[: data.ncon]):
+                first = model.geom_bodyid[contact.geom1] == body
+                m = contact_of.get(int(contact.geom2 if first else contact.geom1))
+                if m is None or not (first or model.geom_bodyid[contact.geom2] == body):
+                    continue
+                library.mj_contactForce(model, data, i, local)
+                force = (-1.0 if first else 1.0) * local[:3] @ contact.frame.reshape(3, 3)
+                forces[n, m] += force
+                weights[n, m] += local[0]
+                places[n, m] += local[0] * contact.pos
+        return forces, np.divide(places, weights, out=np.full_like(places, np.nan), where=weights > 0.0)
+
+    def origins(self, motion: Motion) -> Array:
         """States in which the object is where it was before closing."""
         states = np.zeros((len(motion), self._library.mj_stateSize(self._model, self._spec)))
         states[:, 1 : 1 + self._model.nq] = self.scene.configurations(motion.start, motion.grasps.T_palm_object)
         return states
 
-    def _controls(self, targets: Array, pushes: Array | None = None) -> Array:
+    def controls(self, targets: Array, pushes: Array | None = None) -> Array:
         """Controls (n, steps, a + d) of targets (n, steps, a) and pushes that broadcast to (n, steps, d)."""
         d = self.scene.directions
         controls = np.zeros((*targets.shape[:2], targets.shape[2] + d))
@@ -207,12 +236,12 @@ class Trials:
             controls[..., -d:] = pushes
         return controls
 
-    def _run(self, states: Array, controls: Array) -> Array:
+    def run(self, states: Array, controls: Array) -> Array:
         """States (n, steps, s) that follow states (n, s) under controls."""
         trace, _ = self._library.rollout.rollout(self._model, self._data, states, controls)
         return np.asarray(trace)
 
-    def _moved(self, trace: Array, origin: Array) -> tuple[Array, Array]:
+    def moved(self, trace: Array, origin: Array) -> tuple[Array, Array]:
         """How far the object has moved [m] and turned [rad] in states (n, steps, s) from those in states (n, s)."""
         at = 1 + self.scene.object_at
         d = self.scene.directions

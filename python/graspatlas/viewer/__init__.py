@@ -1,4 +1,4 @@
-"""A result or a path to look at: in a browser, as a page and as a picture.
+"""A result, a path or a trial to look at: in a browser, as a page and as a picture.
 
 What draws it is imported when it is first used, so that importing the package stays quick.
 """
@@ -6,27 +6,32 @@ What draws it is imported when it is first used, so that importing the package s
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TypeAlias
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.paths.path import Path
 from graspatlas.result.result import Result
+from graspatlas.simulation.recording import Recording
 
 if TYPE_CHECKING:
     import meshcat
 
-__all__ = ["export_html", "save_picture", "view"]
+    from graspatlas.viewer.scene.animation import Film
+
+__all__ = ["Shown", "export_html", "save_picture", "view"]
+
+#: What can be shown: a result; a path of grasps; a recorded trial, or several beside each other.
+Shown: TypeAlias = "Result | Path | Recording | Sequence[Recording]"
 
 
-def view(
-    shown: Result | Path, *, open_browser: bool = True, wait: bool = True, host: str = "127.0.0.1"
-) -> meshcat.Visualizer:
-    """Show the best and the worst grasp of a result side by side in a browser; or a path, as a film.
+def view(shown: Shown, *, open_browser: bool = True, wait: bool = True, host: str = "127.0.0.1") -> meshcat.Visualizer:
+    """Show the best and the worst grasp of a result side by side in a browser; or a path or trials, as a film.
 
     The page's address is printed to standard error. Meshcat's controls, top right, play a film and have its slider.
 
     Args:
-        shown: The result, or a path of grasps.
+        shown: The result, a path of grasps, or what :func:`graspatlas.record` recorded: one trial, or a list of them.
         open_browser: Whether to open the page in the browser.
         wait: Whether to serve the page until Ctrl-C is pressed; otherwise it is served until the program ends.
         host: Address on which the page is served. By default only programs of this machine reach it; with
@@ -40,75 +45,93 @@ def view(
     """
     from graspatlas.viewer.web.browser import show
 
-    return show(_checked(shown), open_browser=open_browser, wait=wait, host=host)
+    shown = _checked(shown)
+    told = shown if isinstance(shown, Result) else _film(shown)
+    return show(told, open_browser=open_browser, wait=wait, host=host)
 
 
-def export_html(shown: Result | Path, path: str | os.PathLike[str]) -> None:
-    """Write the best and the worst grasp of a result as one page to rotate in a browser; or a path, with a slider.
+def export_html(shown: Shown, path: str | os.PathLike[str]) -> None:
+    """Write the best and the worst grasp of a result as one page to rotate; or a path or trials, with a slider.
 
-    The page opens from the disk; it needs neither a server nor the network. That of a path opens at the frame that its
+    The page opens from the disk; it needs neither a server nor the network. That of a film opens at the frame that its
     address names, such as ``path.html#frame=30``.
 
     Args:
-        shown: The result, or a path of grasps.
+        shown: The result, a path of grasps, or what :func:`graspatlas.record` recorded: one trial, or a list of them.
         path: Such as ``"can.html"``; an existing file is replaced.
 
     Raises:
         GraspAtlasError: If a mesh cannot be read or the file cannot be written.
     """
     from graspatlas.support.files import replaced
-    from graspatlas.viewer.scene.animation import Film
     from graspatlas.viewer.scene.scene import Scene
     from graspatlas.viewer.web.animation_page import film_page
     from graspatlas.viewer.web.page import page
 
     shown = _checked(shown)
     with replaced(path) as stream:
-        text = film_page(Film(shown)) if isinstance(shown, Path) else page(Scene(shown))
+        text = page(Scene(shown)) if isinstance(shown, Result) else film_page(_film(shown))
         stream.write(text.encode("utf-8"))
 
 
 def save_picture(
-    shown: Result | Path,
+    shown: Shown,
     path: str | os.PathLike[str],
     *,
     width: int = 1600,
     height: int = 900,
     worst: bool = True,
 ) -> None:
-    """Write a picture of the best and the worst grasp, or six grasps of a path, as a PNG file.
+    """Write a picture as a PNG file: best and worst grasp, six grasps of a path, or five moments of each trial.
 
     It needs neither browser nor graphics card.
 
     Args:
-        shown: The result, or a path of grasps.
+        shown: The result, a path of grasps, or what :func:`graspatlas.record` recorded: one trial, or a list of them.
         path: Such as ``"can.png"``; an existing file is replaced.
         width: Width in pixels, at least 320.
         height: Height in pixels, at least 180.
-        worst: Whether the worst grasp stands beside the best; a path's picture has neither.
+        worst: Whether the worst grasp stands beside the best; only of a result.
 
     Raises:
         GraspAtlasError: If the size is too small, a mesh cannot be read or the file cannot be written.
     """
     from graspatlas.support.files import replaced
-    from graspatlas.viewer.render.film_strip import FRAMES, draw_strip
+    from graspatlas.viewer.render.film_strip import FRAMES, draw_rows, draw_strip
     from graspatlas.viewer.render.picture import check_size, draw
-    from graspatlas.viewer.scene.animation import Film
+    from graspatlas.viewer.scene.path_film import path_film
     from graspatlas.viewer.scene.scene import Scene
+    from graspatlas.viewer.scene.trial_film import trial_strips
 
     if os.path.splitext(path)[1].lower() != ".png":
         raise GraspAtlasError(f"a picture's name must end in .png, not '{os.fspath(path)}'")
     check_size(width, height)
     shown = _checked(shown)
     with replaced(path) as stream:
-        if isinstance(shown, Path):
-            image = draw_strip(Film(shown, FRAMES), width, height)
-        else:
+        if isinstance(shown, Result):
             image = draw(Scene(shown, worst=worst), width, height)
+        elif isinstance(shown, Path):
+            image = draw_strip(path_film(shown, FRAMES), width, height)
+        else:
+            films = trial_strips(shown)
+            image = draw_strip(films[0], width, height) if len(films) == 1 else draw_rows(films, width, height)
         image.save(stream, "PNG")
 
 
-def _checked(shown: object) -> Result | Path:
+def _film(shown: Path | list[Recording]) -> Film:
+    from graspatlas.viewer.scene.path_film import path_film
+    from graspatlas.viewer.scene.trial_film import trial_film
+
+    return path_film(shown) if isinstance(shown, Path) else trial_film(shown)
+
+
+def _checked(shown: object) -> Result | Path | list[Recording]:
     if isinstance(shown, Result | Path):
         return shown
-    raise GraspAtlasError(f"only a graspatlas.Result or a path of grasps can be shown, got {type(shown).__name__}")
+    some = list(shown) if isinstance(shown, list | tuple) else [shown]
+    trials = [trial for trial in some if isinstance(trial, Recording)]
+    if trials and len(trials) == len(some):
+        return trials
+    raise GraspAtlasError(
+        f"only a graspatlas.Result, a path of grasps or recorded trials can be shown, got {type(shown).__name__}"
+    )

@@ -6,6 +6,7 @@ They need neither window nor display: ``figure.savefig("atlas.png")`` writes one
 from graspatlas.viewer.figures.atlas import plot_atlas, plot_growth
 from graspatlas.viewer.figures.ellipse import plot_ellipsoid
 from graspatlas.viewer.figures.extremes import plot_best_and_worst
+from graspatlas.viewer.figures.holding import plot_holding
 from graspatlas.viewer.figures.indices import plot_planar_indices
 from graspatlas.viewer.figures.maxima import plot_climbs, plot_local_maxima
 from graspatlas.viewer.figures.pareto import plot_pareto
@@ -20,6 +21,7 @@ __all__ = [
     "plot_climbs",
     "plot_ellipsoid",
     "plot_growth",
+    "plot_holding",
     "plot_local_maxima",
     "plot_pareto",
     "plot_planar_grasp",

@@ -1,19 +1,21 @@
-"""A path as a strip of pictures, drawn without browser, graphics card or display."""
+"""A film as a strip of pictures, drawn without browser, graphics card or display."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from PIL import Image
 
 from graspatlas.support.progress import counted
 from graspatlas.viewer.render.picture import painted
 from graspatlas.viewer.render.text_images import DARK, GREY, legend_image, text_image
-from graspatlas.viewer.scene.animation import Film
+from graspatlas.viewer.scene.animation import Film, Readout
 from graspatlas.viewer.scene.camera import Camera
-from graspatlas.viewer.scene.captions import film_title, index_name, legend
+from graspatlas.viewer.scene.scene import fitted_camera
 
-__all__ = ["FRAMES", "draw_strip"]
+__all__ = ["FRAMES", "draw_rows", "draw_strip"]
 
 #: Pictures of a strip.
 FRAMES = 6
@@ -25,6 +27,8 @@ SEAM, PAPER = 4, (255, 255, 255)
 HEAD, FOOT = 0.055, 0.05
 #: Where the words are in each picture, from its top.
 WORDS = 0.88
+#: Colour of what is wrong.
+ALARM = (192, 0, 32)
 
 
 def draw_strip(film: Film, width: int, height: int) -> Image.Image:
@@ -35,15 +39,46 @@ def draw_strip(film: Film, width: int, height: int) -> Image.Image:
     sheet = Image.new("RGB", (width, height), PAPER)
     for i in counted(range(len(film)), "picture", "grasps"):
         row, column = divmod(i, best.columns)
-        picture = painted(film.frame(i), best.camera, best.wide, best.high)
-        words = _words(film, i, min(best.high / 15.0, best.wide / 13.0))
-        picture.paste(words, ((best.wide - words.width) // 2, int(WORDS * best.high) - words.height // 2), words)
+        picture = best.picture(film, i)
         sheet.paste(picture, (column * (best.wide + SEAM), head + row * (best.high + SEAM)))
-    title = text_image([(film_title(film.path), 0.52 * head, GREY)])
-    sheet.paste(title, (int(0.4 * head), (head - title.height) // 2), title)
-    colours = legend_image(legend()[:2], 0.5 * foot)
-    sheet.paste(colours, ((width - colours.width) // 2, height - (foot + colours.height) // 2), colours)
+    _write_title(sheet, _titles([film], head, width)[0], head, 0)
+    _write_legend(sheet, film, foot)
     return sheet
+
+
+def draw_rows(films: Sequence[Film], width: int, height: int) -> Image.Image:
+    """Films below each other, one picture a frame and one row a film with its title above; seen by one camera."""
+    head, foot = int(HEAD * height), int(FOOT * height)
+    most = max(len(film) for film in films)
+    room = (height - foot) // len(films)
+    wide, high = (width - (most - 1) * SEAM) // most, room - head
+    points = np.concatenate([film.outline for film in films])
+    layout = _Layout(most, wide, high, fitted_camera(points, films[0].direction, wide / high, WINDOW))
+    sheet = Image.new("RGB", (width, height), PAPER)
+    titles = _titles(films, head, width)
+    for row, film in enumerate(films):
+        for i in counted(range(len(film)), "picture", "grasps"):
+            sheet.paste(layout.picture(film, i), (i * (layout.wide + SEAM), row * room + head))
+        _write_title(sheet, titles[row], head, row * room)
+    _write_legend(sheet, films[0], foot)
+    return sheet
+
+
+def _titles(films: Sequence[Film], head: int, width: int) -> list[Image.Image]:
+    """What stands at the head of each film, in letters of one size, as small as they must be."""
+    texts, size = [f"{film.name}: {film.text}" for film in films], 0.52 * head
+    widest = max(text_image([(text, size, GREY)]).width for text in texts)
+    size *= min(1.0, (width - head) / widest)
+    return [text_image([(text, size, GREY)]) for text in texts]
+
+
+def _write_title(sheet: Image.Image, title: Image.Image, head: int, top: int) -> None:
+    sheet.paste(title, (int(0.4 * head), top + (head - title.height) // 2), title)
+
+
+def _write_legend(sheet: Image.Image, film: Film, foot: int) -> None:
+    colours = legend_image(list(film.legend), 0.5 * foot)
+    sheet.paste(colours, ((sheet.width - colours.width) // 2, sheet.height - (foot + colours.height) // 2), colours)
 
 
 @dataclass(frozen=True)
@@ -62,17 +97,21 @@ class _Layout:
         wide, high = (width - (columns - 1) * SEAM) // columns, (height - (rows - 1) * SEAM) // rows
         return cls(columns, wide, high, film.camera(wide / high, WINDOW))
 
+    def picture(self, film: Film, i: int) -> Image.Image:
+        """A frame of the film with the words below it."""
+        picture = painted(film.frame(i), self.camera, self.wide, self.high)
+        words = _words(film.readouts[i], min(self.high / 15.0, self.wide / 13.0))
+        picture.paste(words, ((self.wide - words.width) // 2, int(WORDS * self.high) - words.height // 2), words)
+        return picture
+
     @property
     def magnification(self) -> float:
         """Size of the hand in pixels, but for a factor."""
         return self.high / self.camera.distance
 
 
-def _words(film: Film, frame: int, size: float) -> Image.Image:
+def _words(readout: Readout, size: float) -> Image.Image:
     """What is written below a frame."""
-    path, point = film.path, int(film.points[frame])
-    name = "start" if point == 0 else "end" if point == len(path) - 1 else f"point {point}"
-    lines = [(f"{name}, at {path.arc_length[point]:.2f} of {path.length:.2f}", size, DARK)]
-    if path.knows_quality:
-        lines.append((f"{index_name(path.result)} {path.qualities[point]:.3g}", 0.82 * size, GREY))
-    return text_image(lines)
+    value = readout.value if readout.value != readout.name else ""
+    below = (readout.alarm, 0.82 * size, ALARM) if readout.alarm else (value, 0.82 * size, GREY)
+    return text_image([(readout.name, size, DARK), below])

@@ -9,9 +9,10 @@ from graspatlas.quality.batched import quality_name
 from graspatlas.quality.evaluation import INDICES
 from graspatlas.requirements.base import requirement_name
 from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.simulation.recording import Recording
 from graspatlas.viewer.scene.scene import COLOURS, Colour, Exhibit
 
-__all__ = ["Caption", "caption", "film_title", "index_name", "legend", "subtitle"]
+__all__ = ["Caption", "caption", "index_name", "legend", "path_text", "subtitle", "trial_text"]
 
 #: Motions below this are rounding [mm per rad].
 ROUNDING = 1e-6
@@ -61,13 +62,25 @@ def subtitle(result: GraspAtlas) -> str:
     return f"{result.problem.name}: atlas of {result.atlas.n_charts} charts, {result.status}{those}{unit}"
 
 
-def film_title(path: GraspPath) -> str:
-    """The problem, how long the path is, and whether it meets the requirements."""
+def path_text(path: GraspPath) -> str:
+    """How long a path is, and whether it meets the requirements."""
     those = ""
     if path.result.requirements and path.knows_requirements:
         met = int(path.accepted.sum())
         those = "; all of them meet the requirements" if met == len(path) else f"; {met} of them meet the requirements"
-    return f"{path.result.problem.name}: path of length {path.length:.3g} through {len(path)} grasps{those}"
+    return f"path of length {path.length:.3g} through {len(path)} grasps{those}"
+
+
+def trial_text(recording: Recording) -> str:
+    """What is tried, and how."""
+    protocol = recording.protocol
+    index = recording.index.replace("_", " ")
+    quality = f", {index} {recording.grasp.quality:.3g}" if index else ""
+    push = "a growing push" if recording.growing else f"a push of {protocol.force:g} N"
+    return (
+        f"{recording.name}{quality}; fingers that squeeze with {recording.normal_force:g} N each in the mean, "
+        f"friction {protocol.friction:g}, object of {1e3 * protocol.mass:g} g, {push}"
+    )
 
 
 def legend() -> list[tuple[Colour, str]]:

@@ -41,9 +41,11 @@ COLOURS: dict[str, Colour] = {
     "contact": (0.86, 0.03, 0.12, 1.0),
     "normal": (1.0, 0.50, 0.0, 1.0),
     "ellipsoid": (0.56, 0.20, 0.88, 0.24),
+    "force": (1.0, 0.50, 0.0, 1.0),
+    "push": (0.56, 0.20, 0.88, 1.0),
 }
 #: How much of them shows through what hides them.
-SHOW_THROUGH = {"contact": 0.9, "normal": 0.8, "ellipsoid": 0.22}
+SHOW_THROUGH = {"contact": 0.9, "normal": 0.8, "ellipsoid": 0.22, "force": 0.8, "push": 0.7}
 #: Sizes of contact points and arrows, and the longest semi-axis that an ellipsoid is drawn with [m].
 CONTACT_RADIUS = 0.0042
 NORMAL_LENGTH = 0.042
@@ -66,7 +68,7 @@ class Part:
     """One mesh of one colour.
 
     Attributes:
-        group: ``hand``, ``object``, ``contact``, ``normal`` or ``ellipsoid``.
+        group: ``hand``, ``object``, or what is drawn on top, a name in ``COLOURS``.
         mesh: The mesh; the same one may stand in several parts.
         T: Its placement (4, 4).
         colour: Red, green, blue and opacity, each 0 to 1.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import html
 import json
 from collections.abc import Iterator
 from importlib import resources
@@ -14,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from graspatlas.support.validation import PlainTable
 from graspatlas.viewer.render.text_images import DARK, GREY, text_image
 from graspatlas.viewer.scene.animation import Film
-from graspatlas.viewer.scene.captions import film_title, index_name, legend
+from graspatlas.viewer.scene.camera import Camera
 from graspatlas.viewer.scene.scene import SHOW_THROUGH
 from graspatlas.viewer.web.page import (
     ASPECT,
@@ -36,38 +37,34 @@ __all__ = ["film_animation", "film_caption", "film_commands", "film_page"]
 
 #: Where the grasps are in the page: left, right, bottom, top; each spans -1 to 1.
 WINDOW = (-0.85, 0.85, -0.62, 0.90)
-#: Time that playing takes [s]: so much for each unit of length, at least and at most.
-SECONDS_A_UNIT, LEAST_SECONDS, MOST_SECONDS = 3.0, 3.0, 15.0
-#: Height of the caption compared with that of the page.
-CAPTION_HEIGHT = 0.075
+#: The same where words stand below them.
+LABELLED = (-0.92, 0.92, -0.50, 0.92)
+#: Height of the caption, and of a label's, compared with that of the page.
+CAPTION_HEIGHT, LABEL_HEIGHT = 0.075, 0.085
 
 
 def film_page(film: Film) -> str:
     """The page's text."""
     files = resources.files("graspatlas.viewer.web")
-    player = Template((files / "player.html").read_text(encoding="utf-8")).substitute(last=len(film) - 1)
+    player = Template((files / "player.html").read_text(encoding="utf-8"))
     script = (files / "player.js").read_text(encoding="utf-8").replace("$film", _data(film), 1)
-    name, rest = film_title(film.path).split(": ", 1)
-    rows = legend_rows(name, [rest], legend()[:2])
-    return filled_page(name, film_commands(film), rows, player, script)
+    rows = legend_rows(film.name, [film.text], list(film.legend))
+    bar = player.substitute(last=len(film) - 1, course=html.escape(film.course))
+    return filled_page(film.name, film_commands(film), rows, bar, script)
 
 
 def _data(film: Film) -> str:
     """What the player needs, as JSON that may stand inside a script."""
-    path, moving = film.path, np.flatnonzero(film.moving)
+    moving = np.flatnonzero(film.moving)
     rows = film.T[:, moving, :3, :].transpose(0, 1, 3, 2).astype(np.float32)
     data: PlainTable = {
+        "frames": len(film),
         "paths": [_place(int(i)) for i in moving],
         "placements": base64.b64encode(np.ascontiguousarray(rows).tobytes()).decode("ascii"),
-        "points": film.points.tolist(),
-        "arc_lengths": path.arc_length[film.points].tolist(),
-        "seconds": _seconds(film),
-        "index": index_name(path.result),
+        "readouts": [[readout.value, readout.alarm, readout.details] for readout in film.readouts],
+        "seconds": film.seconds,
+        "curve": None if film.curve is None else film.curve.T.tolist(),
     }
-    if path.knows_quality:
-        data["qualities"] = path.qualities[film.points].tolist()
-    if path.result.requirements and path.knows_requirements:
-        data["accepted"] = path.accepted[film.points].tolist()
     return json.dumps(data).replace("<", "\\u003c")
 
 
@@ -76,13 +73,13 @@ def _place(part: int) -> str:
     return f"{ROOT}/part_{part}"
 
 
-def _seconds(film: Film) -> float:
-    return float(np.clip(SECONDS_A_UNIT * film.path.length, LEAST_SECONDS, MOST_SECONDS))
+def _camera(film: Film) -> Camera:
+    return film.camera(ASPECT, LABELLED if film.labels else WINDOW)
 
 
 def film_commands(film: Film) -> Iterator[Command]:
     """Commands that make meshcat show the first frame, each part at a place of its own."""
-    camera = film.camera(ASPECT, WINDOW)
+    camera = _camera(film)
     yield from studio(camera)
     centred = np.eye(4)
     centred[:3, 3] = -camera.target
@@ -94,24 +91,34 @@ def film_commands(film: Film) -> Iterator[Command]:
         yield set_object(_place(i), group(members))
         yield {"type": "set_transform", "path": _place(i), "matrix": part.T.T.ravel().tolist()}
     yield set_object(f"{ROOT}/floor", floor_shadow(film.frame(len(film) // 2)))
+    height = LABEL_HEIGHT * _visible(camera)
+    for i, label in enumerate(film.labels):
+        image = text_image([(label.title, LETTERS, DARK), (label.text, 0.7 * LETTERS, GREY)])
+        place = label.place - 0.6 * height * camera.axes[1]
+        content = sprite(png_bytes(image), place, height * image.width / image.height, height)
+        yield set_object(f"{ROOT}/label_{i}", content)
 
 
 def film_caption(film: Film) -> Command:
-    """What the path is, below it; for a view that has no foot."""
-    camera = film.camera(ASPECT, WINDOW)
-    name, rest = film_title(film.path).split(": ", 1)
-    rest += "; the controls, top right, play it"
-    image = text_image([(name, LETTERS, DARK), (rest, 0.6 * LETTERS, GREY)])
-    visible = 2.0 * camera.distance * np.tan(camera.field_of_view / 2.0)
+    """What the film is of, below it; for a view that has no foot."""
+    camera = _camera(film)
+    rest = f"{film.text}; the controls, top right, play it"
+    image = text_image([(film.name, LETTERS, DARK), (rest, 0.6 * LETTERS, GREY)])
+    visible = _visible(camera)
     height = CAPTION_HEIGHT * visible
     place = camera.target - 0.44 * visible * camera.axes[1]
     return set_object(f"{ROOT}/caption", sprite(png_bytes(image), place, height * image.width / image.height, height))
 
 
+def _visible(camera: Camera) -> float:
+    """Height of what is seen at the camera's target, metres."""
+    return float(2.0 * camera.distance * np.tan(camera.field_of_view / 2.0))
+
+
 def film_animation(film: Film) -> Command:
     """Command that gives meshcat's controls a slider, and buttons to play and pause."""
-    times = np.linspace(0.0, _seconds(film), len(film))
-    rate = (len(film) - 1) / _seconds(film) if len(film) > 1 else 1.0
+    times = np.linspace(0.0, film.seconds, len(film))
+    rate = (len(film) - 1) / film.seconds if len(film) > 1 else 1.0
     animations = []
     for i in np.flatnonzero(film.moving):
         T = film.T[:, i]
@@ -120,6 +127,8 @@ def film_animation(film: Film) -> Command:
             ".position": ("vector3", T[:, :3, 3]),
             ".quaternion": ("quaternion", Rotation.from_matrix(T[:, :3, :3] / scale).as_quat()),
         }
+        if np.ptp(scale) > 0.0:
+            tracks[".scale"] = ("vector3", np.repeat(scale[:, :, 0], 3, axis=1))
         keys = [
             {
                 "name": name,

@@ -8,7 +8,6 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-from graspatlas.paths.path import Path
 from graspatlas.result.result import Result
 from graspatlas.support.terminal import say
 from graspatlas.viewer.scene.animation import Film
@@ -22,11 +21,10 @@ if TYPE_CHECKING:
 __all__ = ["close", "show"]
 
 
-def show(shown: Result | Path, *, open_browser: bool, wait: bool, host: str) -> meshcat.Visualizer:
-    """Serve a result's scene, or a path's film; see :func:`graspatlas.viewer.view`."""
-    if isinstance(shown, Path):
-        film = Film(shown)
-        name, told = film.path.result.problem.name, [*film_commands(film), film_caption(film), film_animation(film)]
+def show(shown: Result | Film, *, open_browser: bool, wait: bool, host: str) -> meshcat.Visualizer:
+    """Serve a result's scene, or a film; see :func:`graspatlas.viewer.view`."""
+    if isinstance(shown, Film):
+        name, told = shown.name, [*film_commands(shown), film_caption(shown), film_animation(shown)]
     else:
         name, told = shown.problem.name, list(commands(Scene(shown), with_legend=True))
     visualizer = _start(host)

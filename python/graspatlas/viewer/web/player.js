@@ -1,9 +1,9 @@
 <script>
-// Moves hand, object and contacts along the path. Placements are the first three rows of each matrix, column by column.
+// Moves hand, object and what is drawn on them. Placements are the first three rows of each matrix, column by column.
 const film = $film;
 const placements = new Float32Array(Uint8Array.from(atob(film.placements), (c) => c.charCodeAt(0)).buffer);
 const [slider, button, readout] = ["slider", "play", "readout"].map((id) => document.getElementById(id));
-const frames = film.points.length;
+const frames = film.frames;
 let playing = false, started = 0;
 
 function show(frame) {
@@ -13,15 +13,12 @@ function show(frame) {
     viewer.handle_command({ type: "set_transform", path, matrix });
   });
   slider.value = frame;
-  const quality = film.qualities ? film.index + " " + film.qualities[frame].toPrecision(3) : "";
-  const breaks = Boolean(film.accepted) && !film.accepted[frame];
-  const lengths = film.arc_lengths[frame].toFixed(3) + " of " + film.arc_lengths[frames - 1].toFixed(3);
-  const numbers = "point " + film.points[frame] + " of " + film.points[frames - 1];
-  readout.replaceChildren((quality || numbers) + (breaks ? " \u2717 breaks a requirement" : ""), document.createElement("br"));
+  const [value, alarm, details] = film.readouts[frame];
+  readout.replaceChildren(value + (alarm ? " \u2717 " + alarm : ""), document.createElement("br"));
   const small = document.createElement("small");
-  small.textContent = ["arc length " + lengths, quality && numbers].filter(Boolean).join(", ");
+  small.textContent = details;
   readout.append(small);
-  readout.classList.toggle("breaks", breaks);
+  readout.classList.toggle("breaks", Boolean(alarm));
 }
 
 function play(on) {
@@ -47,10 +44,11 @@ function follow_address() {
   show(Math.min(named, frames - 1));
 }
 
-if (film.qualities) {
-  const low = Math.min(...film.qualities), high = Math.max(...film.qualities), end = film.arc_lengths[frames - 1] || 1;
-  const height = (q) => 0.95 - (0.85 * (q - low)) / (high - low || 1);
-  const line = film.qualities.map((q, i) => film.arc_lengths[i] / end + "," + height(q)).join(" L");
+if (film.curve) {
+  const [x, y] = film.curve;
+  const low = Math.min(...y), high = Math.max(...y), width = x[frames - 1] - x[0] || 1;
+  const height = (v) => 0.95 - (0.85 * (v - low)) / (high - low || 1);
+  const line = y.map((v, i) => (x[i] - x[0]) / width + "," + height(v)).join(" L");
   document.getElementById("profile").setAttribute("d", "M0,1 L" + line + " L1,1 Z");
 }
 slider.addEventListener("input", () => { play(false); show(Number(slider.value)); });
