@@ -23,6 +23,8 @@ def simulation(result: ga.Result, forces: list[float]) -> ga.Simulation:
     return ga.Simulation(
         problem=result.problem.name,
         protocol="shake",
+        friction=0.5,
+        torsional=0.0,
         distance=0.01,
         normal_force=5.0,
         seed=0,
@@ -37,6 +39,7 @@ def simulation(result: ga.Result, forces: list[float]) -> ga.Simulation:
         lost_closing=np.array(forces) == 0.0,
         contact_distances=one,
         depths=one[:, 0],
+        pregrasp_distances=np.full(n, 0.01),
         reached=np.ones(n, bool),
         closes=np.arange(n) < 4,
         breaking_forces=np.array(forces),
