@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from graspatlas.commands.arguments import Subcommands, chart_named, path_word
@@ -12,7 +13,7 @@ from graspatlas.commands.exit_status import FAILED, INTERRUPTED
 from graspatlas.errors import GraspAtlasError
 from graspatlas.result.result import Result, load_result
 from graspatlas.simulation.outcome import Simulation
-from graspatlas.simulation.protocols import PROTOCOLS
+from graspatlas.simulation.protocols import PROTOCOLS, find_protocol
 from graspatlas.simulation.recording import record
 from graspatlas.simulation.self_test import KNOWN_PROBLEM, self_test
 from graspatlas.simulation.simulate import simulate
@@ -89,9 +90,8 @@ def _show(result: Result, trials: Simulation, options: argparse.Namespace) -> No
     from graspatlas.viewer import export_html, save_picture  # slow to import
 
     chart = None if options.chart is None else int(trials.charts[0])
-    film = record(
-        result, chart=chart, protocol=trials.protocol, distance=trials.distance, normal_force=trials.normal_force
-    )
+    protocol = replace(find_protocol(trials.protocol), friction=trials.friction, torsional=trials.torsional)
+    film = record(result, chart=chart, protocol=protocol, distance=trials.distance, normal_force=trials.normal_force)
     for file, write in ((options.html, export_html), (options.picture, save_picture)):
         if file:
             write(film, file)

@@ -252,7 +252,7 @@ def _readout(recordings: Sequence[Recording], t: float) -> Readout:
         return Readout(name, name, "; ".join([f"{t:.2f} s", *states]))
     moved = float(np.linalg.norm(_center(first, step) - _center(first, 0)))
     sizes = ", ".join(f"{force:.1f}" for force in np.linalg.norm(first.contact_forces[step], axis=1))
-    details = f"{t:.2f} s, object moved {1e3 * moved:.1f} mm; fingers press with {sizes} N"
+    details = f"{t:.2f} s, moved {1e3 * moved:.1f} mm; fingers {sizes} N"
     return Readout(name, name, details, _outcome(first) if first.lost[step] else "")
 
 
