@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -79,6 +81,20 @@ def test_pushes_in_a_row_begin_where_the_last_ended(pinched: ga.Grasps) -> None:
     assert survived == sorted(survived, reverse=True)
     assert survived[0]
     assert not survived[-1]
+
+
+def test_a_simulation_that_becomes_unstable_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Servos a thousand times too stiff for the step of time: MuJoCo's numbers grow without bound."""
+    monkeypatch.chdir(tmp_path)  # where MuJoCo writes its log
+    problem = ga.load_problem("allegro_sphere_3")
+    stiff = replace(PROTOCOLS["dexgraspbench"], stiffness=1e6, largest_torque=1e7)
+    trials = simulate_grasps(ga.Grasps(problem, problem.x1_array), protocol=stiff)
+    assert trials.unstable.all()
+    assert not trials.held.any()
+    assert trials.trial(0)["shift_mm"] is None
+    assert json.dumps(trials.summary(), allow_nan=False)
+    sound = simulate_grasps(ga.Grasps(problem, problem.x1_array), protocol="multidex")
+    assert not sound.unstable.any()
 
 
 @pytest.mark.parametrize("name", ["gripper_skittle", "planar_hand", "three_finger_cup"])

@@ -37,6 +37,7 @@ def simulation(result: ga.Result, forces: list[float]) -> ga.Simulation:
         turns=one,
         closing_shifts=one[:, 0],
         lost_closing=np.array(forces) == 0.0,
+        unstable=np.zeros(n, bool),
         contact_distances=one,
         depths=one[:, 0],
         pregrasp_distances=np.full(n, 0.01),

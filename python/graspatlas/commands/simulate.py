@@ -108,8 +108,11 @@ def _report(trials: Simulation) -> None:
     first = trials.trial(0)
     what = "the refined best" if first["refined"] else f"chart {first['chart']}"
     say(f"{trials.problem}, {trials.protocol}: {what} survived {first['survived']} of {first['of']} pushes")
-    fell = f"; lost while {first['lost_while']}" if first["lost_while"] else ""
-    say(f"  the object moved {first['shift_mm']:.2g} mm and turned {first['turn_deg']:.2g} degrees at most{fell}")
+    if first["unstable"] or first["shift_mm"] is None:
+        say("  MuJoCo gave this trial up, because its numbers grew without bound: nothing is known of this grasp")
+    else:
+        fell = f"; lost while {first['lost_while']}" if first["lost_while"] else ""
+        say(f"  the object moved {first['shift_mm']:.2g} mm and turned {first['turn_deg']:.2g} degrees at most{fell}")
     if first["breaking_direction"] is not None:
         along = ", ".join(f"{value:.2f}" for value in first["breaking_direction"])
         force = first["breaking_force_n"]
@@ -122,6 +125,8 @@ def _report(trials: Simulation) -> None:
     if len(trials) > 1:
         lost = int(trials.lost_closing.sum())
         say(f"  of {len(trials)} grasps {int(trials.held.sum())} survived all pushes; {lost} were lost while closing")
+        if trials.unstable.any():
+            say(f"  MuJoCo gave up {int(trials.unstable.sum())} trials, because their numbers grew without bound")
     say(f"  {trials.seconds:.1f} s" + ("" if trials.complete else "; interrupted"))
 
 

@@ -26,10 +26,11 @@ class TrialRecord(TypedDict):
     refined: bool
     survived: int
     of: int
-    shift_mm: float
-    turn_deg: float
+    shift_mm: float | None
+    turn_deg: float | None
     lost_while: str | None
-    closing_shift_mm: float
+    closing_shift_mm: float | None
+    unstable: bool
     contact_distance_mm: dict[str, float]
     penetration_mm: float
     pregrasp_mm: float
@@ -51,6 +52,7 @@ class SimulationSummary(TypedDict):
     seed: int
     n_grasps: int
     n_held: int
+    n_unstable: int
     rate: float
     lost_closing: int
     complete: bool
@@ -79,6 +81,8 @@ class Simulation:
         turns: How far it turned at most (n, p), radians.
         closing_shifts: How far the object moved while the hand closed (n,), metres.
         lost_closing: Whether it was lost while the hand closed (n,).
+        unstable: Whether MuJoCo gave a trial of the grasp up, because its numbers grew without bound (n,): nothing that
+            the others say of it counts, and it has not held.
         contact_distances: Of each contact's shapes before closing (n, m), metres; negative where they overlap.
         depths: Deepest overlap of hand and object before closing (n,), metres.
         pregrasp_distances: How far off the object the fingertips began (n,), metres.
@@ -107,6 +111,7 @@ class Simulation:
     turns: Array
     closing_shifts: Array
     lost_closing: BoolArray
+    unstable: BoolArray
     contact_distances: Array
     depths: Array
     pregrasp_distances: Array
@@ -135,23 +140,24 @@ class Simulation:
 
     def trial(self, i: int) -> TrialRecord:
         """What one trial has shown, in plain data."""
-        breaking = float(self.breaking_forces[i])
+        breaking = _finite(self.breaking_forces[i])
         return {
             "chart": int(self.charts[i]),
             "refined": bool(self.refined[i]),
             "survived": int(self.survived[i].sum()),
             "of": len(self.pushes),
-            "shift_mm": 1e3 * float(self.shifts[i].max()),
-            "turn_deg": float(np.degrees(self.turns[i].max())),
+            "shift_mm": _finite(1e3 * self.shifts[i].max()),
+            "turn_deg": _finite(np.degrees(self.turns[i].max())),
             "lost_while": self._lost_while(i),
-            "closing_shift_mm": 1e3 * float(self.closing_shifts[i]),
+            "closing_shift_mm": _finite(1e3 * self.closing_shifts[i]),
+            "unstable": bool(self.unstable[i]),
             "contact_distance_mm": dict(zip(self.contacts, (1e3 * self.contact_distances[i]).tolist(), strict=True)),
             "penetration_mm": 1e3 * float(self.depths[i]),
             "pregrasp_mm": 1e3 * float(self.pregrasp_distances[i]),
             "pregrasp_reached": bool(self.reached[i]),
             "force_closed": bool(self.closes[i]),
-            "breaking_force_n": breaking if np.isfinite(breaking) else None,
-            "breaking_direction": self.breaking_directions[i].tolist() if np.isfinite(breaking) else None,
+            "breaking_force_n": breaking,
+            "breaking_direction": None if breaking is None else self.breaking_directions[i].tolist(),
         }
 
     def _lost_while(self, i: int) -> str | None:
@@ -171,6 +177,7 @@ class Simulation:
             "seed": self.seed,
             "n_grasps": len(self),
             "n_held": int(self.held.sum()),
+            "n_unstable": int(self.unstable.sum()),
             "rate": self.rate,
             "lost_closing": int(self.lost_closing.sum()),
             "complete": self.complete,
@@ -208,7 +215,7 @@ def load_simulation(path: str | os.PathLike[str]) -> Simulation:
         raise GraspAtlasError(f"'{path}' holds no simulation ({error}); run graspatlas simulate again") from None
 
 
-_FLAGS = ("refined", "survived", "lost_closing", "reached", "closes")
+_FLAGS = ("refined", "survived", "lost_closing", "unstable", "reached", "closes")
 _NUMBERS = (
     "pushes",
     "shifts",
@@ -220,6 +227,11 @@ _NUMBERS = (
     "breaking_forces",
     "breaking_directions",
 )
+
+
+def _finite(value: float) -> float | None:
+    """A number that JSON knows, or nothing."""
+    return float(value) if np.isfinite(value) else None
 
 
 def _plain(value: Any) -> Any:

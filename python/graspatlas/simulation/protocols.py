@@ -14,7 +14,7 @@ __all__ = ["PROTOCOLS", "Protocol", "find_protocol"]
 
 @dataclass(frozen=True)
 class Protocol:
-    """A test of grasps. Positions are held by servos: torque = stiffness (target - position), critically damped.
+    """A test of grasps. Positions are held by servos: torque = stiffness (target - position) - damping velocity.
 
     Attributes:
         name: Its name.
@@ -22,6 +22,7 @@ class Protocol:
         friction: Coefficient of friction at all contacts.
         torsional: Torsional friction [m]: torque about the normal for a normal force of one; 0 for none.
         stiffness: Of the servo of a revolute joint [N m/rad].
+        damping: Of the same servo [N m s/rad]; 0 for critical damping.
         largest_torque: That it can exert [N m].
         step: Of the simulation [s].
         closing: Time from pregrasp to grasp, and from grasp to squeeze [s].
@@ -41,6 +42,7 @@ class Protocol:
     friction: float = 0.6
     torsional: float = 0.02
     stiffness: float = 5.0
+    damping: float = 0.0
     largest_torque: float = 3.0
     step: float = 0.004
     closing: tuple[float, float] = (0.4, 0.4)
@@ -70,8 +72,10 @@ PROTOCOLS: dict[str, Protocol] = {
             friction=3.0,
             torsional=0.0,
             stiffness=1000.0,
+            damping=200.0,
             largest_torque=1000.0,
             step=0.005,
+            closing=(2.0, 2.0),  # ten times what these servos take
             force=0.05,
             seconds=1.0,
             in_a_row=True,

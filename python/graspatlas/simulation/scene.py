@@ -214,7 +214,9 @@ class Scene:
     def _add_servos(self, actuators: Element) -> None:
         for name in self.servos:
             stiffness, largest = self.servo(name)
-            how = {"kp": text([stiffness]), "dampratio": "1", "forcerange": text((-largest, largest))}
+            damping = self.protocol.damping / (LEVER**2 if self._sliding[name] else 1.0)
+            damped = {"kv": text([damping])} if damping > 0.0 else {"dampratio": "1"}
+            how = {"kp": text([stiffness]), **damped, "forcerange": text((-largest, largest))}
             child(actuators, "position", name=name, joint=name, **how)
         for i, axis in enumerate("xyz"[: self.directions]):
             planar = self.problem.object_joint_model.planar

@@ -189,7 +189,9 @@ def _tried(
         forces[shaken], directions[shaken] = found.min(axis=1), along[found.argmin(axis=1)]
     pushed = trials.push(motion, closed)
     bad = start.depths >= protocol.start_depth
+    unstable = np.isnan(closed.shifts) | np.isnan(pushed.shifts).any(axis=1) | (shaken & np.isnan(forces))
     return {
+        "unstable": unstable,
         "survived": pushed.survived & ~bad[:, None],
         "shifts": pushed.shifts,
         "turns": pushed.turns,

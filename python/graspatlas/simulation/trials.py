@@ -163,7 +163,9 @@ class Trials:
         return Pushed(survived & closed.held[:, None], shifts, turns)
 
     def shake(self, motion: Motion, closed: Closed, directions: Array) -> Array:
-        """Forces at which the object is lost when a push grows along each direction (n, d) [N]; inf where it is not.
+        """Forces at which the object is lost when a push grows along each direction (n, d) [N].
+
+        They are inf where it is not lost, and NaN where the simulation became unstable.
 
         Lost is what has moved further than ``LOST_SHIFT`` from where it was in the closed hand, or turned further than
         ``LOST_TURN``; 0 where the object was lost while the hand closed.
@@ -189,6 +191,7 @@ class Trials:
             lost = (shifts > LOST_SHIFT) | (turns > LOST_TURN)
             gone = lost.any(axis=1)
             forces[left[gone]] = sizes[lost[gone].argmax(axis=1)]
+            forces[left[np.isnan(shifts[:, -1])]] = np.nan
             states[left] = trace[:, -1]
         return forces.reshape(len(motion), d)
 
@@ -237,9 +240,16 @@ class Trials:
         return controls
 
     def run(self, states: Array, controls: Array) -> Array:
-        """States (n, steps, s) that follow states (n, s) under controls."""
+        """States (n, steps, s) that follow states (n, s) under controls; NaN where a simulation became unstable.
+
+        MuJoCo ends such a one before its time.
+        """
         trace, _ = self._library.rollout.rollout(self._model, self._data, states, controls)
-        return np.asarray(trace)
+        trace = np.asarray(trace)
+        ends = states[:, 0] + controls.shape[1] * self.scene.protocol.step
+        unstable = ~(np.abs(trace[:, -1, 0] - ends) < 0.5 * self.scene.protocol.step)
+        trace[unstable] = np.nan
+        return trace
 
     def moved(self, trace: Array, origin: Array) -> tuple[Array, Array]:
         """How far the object has moved [m] and turned [rad] in states (n, steps, s) from those in states (n, s)."""
