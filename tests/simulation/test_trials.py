@@ -42,6 +42,22 @@ def test_a_push_that_friction_cannot_hold_is_survived_in_no_direction_across(pin
     assert trial.trial(0)["lost_while"] == "pushed"
 
 
+def test_what_no_push_takes_away_has_no_breaking_force(pinched: ga.Grasps) -> None:
+    sticky = replace(SHAKE, friction=4.0, torsional=0.05, stiffness=50.0, largest_torque=30.0)
+    trial = simulate_grasps(pinched, protocol=sticky, normal_force=40.0, breaking=True)
+    assert trial.breaking_forces[0] == np.inf
+    assert trial.trial(0)["breaking_force_n"] is None
+
+
+def test_names_of_the_users_hand_are_free() -> None:
+    """A hand may have joints that are called as parts of a scene are."""
+    problem = pinch()
+    text = problem.hand.urdf.replace("left_slide", "object").replace("right_slide", "push_x")
+    joints = {"object": 0.07, "push_x": 0.07}
+    named = replace(problem, hand=ga.Hand("named", text), x1=ga.FirstGrasp(joints))
+    assert simulate_grasps(ga.Grasps(named, named.x1_array)).held.all()
+
+
 def test_nothing_moves_while_a_pinch_closes(pinched: ga.Grasps) -> None:
     trial = simulate_grasps(pinched, normal_force=5.0)
     assert trial.held.all()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from graspatlas.simulation.protocols import PROTOCOLS, find_protocol
 from graspatlas.simulation.recording import record
 from graspatlas.simulation.self_test import KNOWN_PROBLEM, self_test
 from graspatlas.simulation.simulate import simulate
+from graspatlas.simulation.trials import LARGEST_FORCE
 from graspatlas.support.terminal import say
 
 __all__ = ["add_simulate_command"]
@@ -117,6 +119,8 @@ def _report(trials: Simulation) -> None:
         along = ", ".join(f"{value:.2f}" for value in first["breaking_direction"])
         force = first["breaking_force_n"]
         say(f"  it was lost under a growing push of {force:.2f} N along ({along}) of the palm")
+    elif trials.breaking_forces[0] == math.inf:
+        say(f"  a growing push took it away in no direction, up to {LARGEST_FORCE:g} N")
     distances = ", ".join(f"{name} {round(value, 3) + 0.0:.3f}" for name, value in first["contact_distance_mm"].items())
     penetration = first["penetration_mm"]
     say(f"  at the start: distance of contacts {distances} mm; penetration {penetration:.3f} mm")

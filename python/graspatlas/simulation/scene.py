@@ -170,10 +170,10 @@ class Scene:
         body = child(world, "body", name="object")
         if self.problem.object_joint_model.planar:
             for axis, direction in (("x", "1 0 0"), ("y", "0 1 0")):
-                child(body, "joint", name=f"object_{axis}", type="slide", axis=direction)
-            child(body, "joint", name="object_turn", type="hinge", axis="0 0 1")
+                child(body, "joint", name=f"{OBJECT}{axis}", type="slide", axis=direction)
+            child(body, "joint", name=f"{OBJECT}turn", type="hinge", axis="0 0 1")
         else:
-            child(body, "freejoint", name="object")
+            child(body, "freejoint", name=f"{OBJECT}pose")
         mass = self.protocol.mass
         add_inertial(body, mass, np.zeros(3), mass * unit_inertia(self.problem.object, self._shapes.object))
         for shape in self._shapes.object:
@@ -220,8 +220,8 @@ class Scene:
             child(actuators, "position", name=name, joint=name, **how)
         for i, axis in enumerate("xyz"[: self.directions]):
             planar = self.problem.object_joint_model.planar
-            where = {"joint": f"object_{axis}"} if planar else {"joint": "object", "gear": text(np.eye(6)[i])}
-            child(actuators, "motor", name=f"push_{axis}", **where)
+            where = {"joint": f"{OBJECT}{axis}"} if planar else {"joint": f"{OBJECT}pose", "gear": text(np.eye(6)[i])}
+            child(actuators, "motor", name=f"push/{axis}", **where)
 
     def servo(self, joint: str) -> tuple[float, float]:
         """Stiffness and largest force of a joint's servo [N m/rad and N m, or N/m and N]."""
