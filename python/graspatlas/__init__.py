@@ -43,7 +43,7 @@ from graspatlas.result.result import Result, load_result
 from graspatlas.search.grasp_search import find_grasps
 from graspatlas.simulation.outcome import Simulation, load_simulation
 from graspatlas.simulation.recording import Recording, record
-from graspatlas.simulation.simulate import simulate
+from graspatlas.simulation.runs import simulate
 from graspatlas.systems.projection import project
 from graspatlas.systems.system import System
 from graspatlas.version import __version__ as __version__

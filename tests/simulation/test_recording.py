@@ -13,7 +13,7 @@ from pinch import pinch
 
 import graspatlas as ga
 from graspatlas.simulation.protocols import PROTOCOLS
-from graspatlas.simulation.simulate import simulate_grasps
+from graspatlas.simulation.runs import simulate_grasps
 
 
 @pytest.fixture(scope="module")

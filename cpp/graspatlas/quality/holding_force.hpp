@@ -30,8 +30,8 @@ struct HoldingLimits {
 /// are a convex body about the origin, and H is the radius of the largest ball in it. Contact programmes say how far it
 /// reaches in a direction, with points of it; their hull is refined where it is nearest to the origin.
 ///
-/// The result is a ball in that hull, so never more than the grasp withstands, and at most by the relative `gap` less;
-/// 0 without force closure.
+/// The result is a ball in that hull, so never more than the grasp withstands, and at most by the relative `gap` less,
+/// unless the hull comes to its largest number of facets first; 0 without force closure.
 class HoldingForce {
  public:
   HoldingForce(GraspSystem& system, HoldingLimits limits);

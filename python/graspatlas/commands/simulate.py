@@ -16,8 +16,8 @@ from graspatlas.result.result import Result, load_result
 from graspatlas.simulation.outcome import Simulation
 from graspatlas.simulation.protocols import PROTOCOLS, find_protocol
 from graspatlas.simulation.recording import record
+from graspatlas.simulation.runs import simulate
 from graspatlas.simulation.self_test import KNOWN_PROBLEM, self_test
-from graspatlas.simulation.simulate import simulate
 from graspatlas.simulation.trials import LARGEST_FORCE
 from graspatlas.support.terminal import say
 

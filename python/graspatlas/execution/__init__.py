@@ -1,6 +1,10 @@
-"""What a controller needs to execute a grasp: contact forces and joint torques, and the squeeze that exerts them."""
+"""What a controller needs to execute a grasp: contact forces, the squeeze that exerts them, pregrasp and the way in.
 
-from graspatlas.execution.contact_forces import ContactForces, ForceOptions, contact_forces
-from graspatlas.execution.squeeze import squeeze
+The methods of :class:`graspatlas.Grasp` and :class:`graspatlas.Grasps` make these.
+"""
 
-__all__ = ["ContactForces", "ForceOptions", "contact_forces", "squeeze"]
+from graspatlas.execution.approach import Approach
+from graspatlas.execution.contact_forces import ContactForces, ForceOptions
+from graspatlas.execution.pregrasp import Pregrasp
+
+__all__ = ["Approach", "ContactForces", "ForceOptions", "Pregrasp"]

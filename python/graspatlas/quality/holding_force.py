@@ -51,7 +51,8 @@ def holding_force(
 
     the radius of the largest ball in the convex body of all disturbances that are withstood. They are forces without a
     torque about the centre of mass, ``object.center_of_mass``; or forces and torques, these divided by `torque_length`.
-    Cones are round. The value is never above the true one, and at most by the relative `gap` below it. It counts on a
+    Cones are round. The value is never above the true one, and at most by the relative `gap` below it; further below
+    only where the refinement ends after 20,000 facets, as with torques it may for very symmetric grasps. It counts on a
     hand that adapts its forces to the disturbance. The weight of the object is a disturbance like any other: one of m
     kilogrammes is held in every attitude if the value is above 9.81 m.
 

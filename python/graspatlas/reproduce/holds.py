@@ -19,7 +19,7 @@ from graspatlas.simulation.mujoco_library import mujoco_library
 from graspatlas.simulation.outcome import Simulation
 from graspatlas.simulation.protocols import PROTOCOLS
 from graspatlas.simulation.recording import record
-from graspatlas.simulation.simulate import simulate_grasps
+from graspatlas.simulation.runs import simulate_grasps
 from graspatlas.simulation.trials import GROWTH
 from graspatlas.support.arrays import Array
 from graspatlas.viewer.figures.style import Picture

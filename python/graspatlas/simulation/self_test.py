@@ -8,7 +8,7 @@ from graspatlas.grasps.grasps import Grasps
 from graspatlas.problems import load_problem
 from graspatlas.simulation.outcome import Simulation
 from graspatlas.simulation.protocols import PROTOCOLS
-from graspatlas.simulation.simulate import simulate_grasps
+from graspatlas.simulation.runs import simulate_grasps
 
 __all__ = ["KNOWN_PROBLEM", "self_test"]
 

@@ -14,10 +14,10 @@ import pytest
 from helpers import tripod_problem
 
 import graspatlas as ga
-from graspatlas.simulation import simulate as simulate_module
+from graspatlas.simulation import runs
 from graspatlas.simulation.protocols import PROTOCOLS
+from graspatlas.simulation.runs import simulate_grasps
 from graspatlas.simulation.self_test import self_test
-from graspatlas.simulation.simulate import simulate_grasps
 
 Cli = Callable[..., tuple[int, str, str]]
 
@@ -46,6 +46,14 @@ def test_closed_grasps_hold_and_touch_where_they_say(trials: ga.Simulation) -> N
     assert trials.held.all()
     assert np.abs(trials.contact_distances).max() < 5e-5
     assert trials.depths.max() < 5e-5
+
+
+def test_the_best_is_tried_once(result: ga.Result) -> None:
+    few = replace(result, accepted=np.isin(np.arange(result.atlas.n_charts), result.candidates()[:3]))
+    assert sorted(ga.simulate(few, everything=True).charts.tolist()) == few.candidates().tolist()
+    assert sorted(ga.simulate(few, sample=99).charts.tolist()) == few.candidates().tolist()
+    with pytest.raises(ga.GraspAtlasError, match="no grasp to try"):
+        simulate_grasps(ga.Grasps(result.problem, result.atlas.centers[:0]))
 
 
 def test_chosen_charts_are_tried_in_their_order(result: ga.Result) -> None:
@@ -97,6 +105,7 @@ def test_a_file_of_something_else_is_refused(text: str, tmp_path: Path) -> None:
         ({"charts": []}, "charts names none"),
         ({"charts": [0], "sample": 3}, "only one of"),
         ({"sample": 0}, "sample"),
+        ({"sample": 2, "seed": -1}, "seed must be a whole number of at least 0"),
     ],
 )
 def test_wrong_arguments_are_named(result: ga.Result, options: dict[str, object], words: str) -> None:
@@ -116,7 +125,7 @@ def test_a_hand_without_shapes_is_refused() -> None:
 
 
 def test_ctrl_c_keeps_what_was_tried(result: ga.Result, monkeypatch: pytest.MonkeyPatch) -> None:
-    tried, rounds = simulate_module._tried, []
+    tried, rounds = runs._tried, []
 
     def pressed(*arguments: object) -> object:
         if rounds:
@@ -124,8 +133,8 @@ def test_ctrl_c_keeps_what_was_tried(result: ga.Result, monkeypatch: pytest.Monk
         rounds.append(0)
         return tried(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(simulate_module, "_tried", pressed)
-    monkeypatch.setattr(simulate_module, "TOGETHER", 2)
+    monkeypatch.setattr(runs, "_tried", pressed)
+    monkeypatch.setattr(runs, "TOGETHER", 2)
     trials = ga.simulate(result, sample=5)
     assert not trials.complete
     assert len(trials) == 2

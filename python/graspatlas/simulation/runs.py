@@ -54,12 +54,12 @@ def simulate(
             force_closure states, in place of the protocol's.
         charts: Only these charts, in this order, and not the best.
         sample: Also so many charts that meet the requirements, chosen at random; all of them where there are fewer.
-        everything: Also all charts that meet the requirements.
+        everything: Also all charts that meet the requirements, the best chart once.
         distance: From the object at which the fingertips begin [m].
         normal_force: With which the fingers squeeze, in the mean of the contacts [N].
         breaking: Also find the smallest growing push under which each object is lost; of the first grasp it is always
-            found. The protocol ``shake`` does nothing else.
-        seed: Of the random sample.
+            found, and by the protocol ``shake`` of all.
+        seed: Of the random sample; not negative.
         progress: Show progress; by default on a terminal.
 
     Returns:
@@ -110,15 +110,16 @@ def _chosen(
             raise GraspAtlasError("charts names none; give some, or leave it out for the best")
         return np.zeros(len(numbers), bool), numbers
     candidates = np.asarray(result.candidates(), np.int64)
-    first = result.refined_best.chart if result.refinement is not None else result.best.chart
-    others = candidates if everything else candidates[:0]
+    is_refined = result.refinement is not None
+    first = result.refined_best.chart if is_refined else result.best.chart
+    left = candidates if is_refined else candidates[candidates != first]
+    others = left if everything else left[:0]
     if sample is not None:
-        count = min(whole(sample, "sample"), len(candidates))
-        others = np.sort(np.random.default_rng(seed).choice(candidates, count, replace=False))
-    numbers = np.append(np.int64(first), others)
-    refined = np.zeros(len(numbers), bool)
-    refined[0] = result.refinement is not None
-    return refined, numbers
+        count = min(whole(sample, "sample"), len(left))
+        others = np.sort(np.random.default_rng(whole(seed, "seed", 0)).choice(left, count, replace=False))
+    refined = np.zeros(1 + len(others), bool)
+    refined[0] = is_refined
+    return refined, np.append(np.int64(first), others)
 
 
 def simulate_grasps(
@@ -132,8 +133,10 @@ def simulate_grasps(
     seed: int = 0,
     progress: bool | None = None,
 ) -> Simulation:
-    """Try a batch of grasps, as :func:`simulate` does those of a result."""
+    """Try a batch of grasps, at least one, as :func:`simulate` does those of a result."""
     chosen = find_protocol(protocol)
+    if not len(grasps):
+        raise GraspAtlasError("there is no grasp to try")
     positive(distance, "distance")
     positive(normal_force, "normal_force")
     began = time.perf_counter()
