@@ -19,7 +19,8 @@ from graspatlas.execution.approach import Approach
 from graspatlas.execution.contact_forces import ContactForces
 from graspatlas.execution.pregrasp import Pregrasp
 from graspatlas.formats.export import export_grasps
-from graspatlas.grasps.grasps import Grasp, Grasps
+from graspatlas.grasps.grasp import Grasp
+from graspatlas.grasps.grasps import Grasps
 from graspatlas.hand import motions
 from graspatlas.hand.body import Body
 from graspatlas.hand.hand import Hand

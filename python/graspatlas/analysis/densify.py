@@ -20,7 +20,8 @@ import numpy as np
 
 from graspatlas.atlas.grid import Grid, grid_blocks, joined_grid
 from graspatlas.errors import GraspAtlasError
-from graspatlas.grasps.grasps import Grasp, Grasps
+from graspatlas.grasps.grasp import Grasp
+from graspatlas.grasps.grasps import Grasps
 from graspatlas.problem.problem import Problem
 from graspatlas.quality.evaluation import evaluate
 from graspatlas.requirements.screening import screen

@@ -19,7 +19,7 @@ from typing_extensions import Unpack
 from graspatlas.atlas.atlas import Atlas
 from graspatlas.atlas.status import Status
 from graspatlas.errors import GraspAtlasError
-from graspatlas.grasps.grasps import Grasp
+from graspatlas.grasps.grasp import Grasp
 from graspatlas.optimizer.optimize import optimize
 from graspatlas.optimizer.options import OptimizeOptions, with_defaults
 from graspatlas.problem.problem import Problem

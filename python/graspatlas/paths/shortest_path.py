@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from graspatlas.atlas.atlas import Atlas
 from graspatlas.errors import GraspAtlasError
-from graspatlas.grasps.grasps import Grasp
+from graspatlas.grasps.grasp import Grasp
 from graspatlas.paths.path import GraspPath, Path
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.support.arrays import Array, BoolArray

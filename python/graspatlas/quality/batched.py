@@ -16,7 +16,8 @@ from typing import SupportsFloat, TypeVar
 
 from numpy.typing import ArrayLike
 
-from graspatlas.grasps.grasps import Grasp, Grasps
+from graspatlas.grasps.grasp import Grasp
+from graspatlas.grasps.grasps import Grasps
 
 __all__ = ["Quality", "batched", "quality_name"]
 

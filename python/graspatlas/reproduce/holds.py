@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.grasps.grasps import Grasp, Grasps
+from graspatlas.grasps.grasp import Grasp
+from graspatlas.grasps.grasps import Grasps
 from graspatlas.quality.batched import batched
 from graspatlas.quality.holding_force import holding_force
 from graspatlas.reproduce.report import Number, Plate, Section

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.callables import called_flags
-from graspatlas.grasps.grasps import Grasp, Grasps
+from graspatlas.grasps.grasp import Grasp
+from graspatlas.grasps.grasps import Grasps
 from graspatlas.problem.requirement import StatedRequirement
 from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.support.validation import shown

@@ -14,7 +14,8 @@ from graspatlas import _core
 from graspatlas.atlas.atlas import Atlas
 from graspatlas.atlas.status import Status
 from graspatlas.errors import GraspAtlasError
-from graspatlas.grasps.grasps import Grasp, Grasps
+from graspatlas.grasps.grasp import Grasp
+from graspatlas.grasps.grasps import Grasps
 from graspatlas.problem.problem import Problem
 from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.quality.evaluation import evaluate

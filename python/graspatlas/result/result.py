@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 from graspatlas.atlas.verification import CheckReport
 from graspatlas.grasps.columns import grasp_columns, parameter_columns
-from graspatlas.grasps.grasps import Grasp, Grasps
+from graspatlas.grasps.grasp import Grasp
+from graspatlas.grasps.grasps import Grasps
 from graspatlas.quality.batched import quality_name
 from graspatlas.result.exports import Choice, save_grasps
 from graspatlas.result.files import read_result, save_result

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.grasps.grasps import Grasp, Grasps
+from graspatlas.grasps.grasp import Grasp
+from graspatlas.grasps.grasps import Grasps
 from graspatlas.quality.batched import quality_name
 from graspatlas.result.grasp_atlas import GraspAtlas, check_is_result
 from graspatlas.simulation.motion import Motion, plan

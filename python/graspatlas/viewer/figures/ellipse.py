@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
-from graspatlas.grasps.grasps import Grasp
+from graspatlas.grasps.grasp import Grasp
 from graspatlas.problem.problem import Problem
 from graspatlas.viewer.figures.style import COLUMN, Picture, readable, styled
 

@@ -8,7 +8,8 @@ from dataclasses import replace
 from matplotlib.figure import Figure
 
 from graspatlas.analysis.peaks import local_maxima
-from graspatlas.grasps.grasps import Grasp, Grasps
+from graspatlas.grasps.grasp import Grasp
+from graspatlas.grasps.grasps import Grasps
 from graspatlas.quality.batched import batched, quality_name
 from graspatlas.quality.evaluation import INDICES, evaluate
 from graspatlas.result.result import Result

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.grasps.grasps import Grasp
+from graspatlas.grasps.grasp import Grasp
 from graspatlas.problem.problem import Problem
 from graspatlas.support.arrays import Array
 from graspatlas.viewer.figures.style import COLUMN, INK, Picture, styled

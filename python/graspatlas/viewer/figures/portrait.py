@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from graspatlas.grasps.grasps import Grasp
+from graspatlas.grasps.grasp import Grasp
 from graspatlas.problem.problem import Problem
 from graspatlas.support.arrays import Array, Float32Array
 from graspatlas.viewer.render.raster import nearest

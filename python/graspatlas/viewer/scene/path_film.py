@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.grasps.grasps import Grasp
+from graspatlas.grasps.grasp import Grasp
 from graspatlas.paths.path import GraspPath, Path
 from graspatlas.support.arrays import Array, IntArray
 from graspatlas.viewer.scene.animation import MAX_FRAMES, Film, Readout, evenly_chosen

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from graspatlas.grasps.grasps import Grasp
+from graspatlas.grasps.grasp import Grasp
 from graspatlas.problem.object_joint import ObjectJoint
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.support.arrays import Array

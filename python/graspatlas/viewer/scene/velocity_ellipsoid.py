@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from graspatlas.grasps.grasps import Grasp
+from graspatlas.grasps.grasp import Grasp
 from graspatlas.support.arrays import Array
 
 __all__ = ["coordinated_motions", "velocity_ellipsoid"]
