@@ -1,9 +1,9 @@
 """Measures which quality index tells whether a grasp holds, and writes the tables of physics.md.
 
-For each bundled problem a random sample of the charts that are free of collision is tried in MuJoCo, and each index is
-compared with what happened. Run from the root of the repository; it takes some twenty minutes on two cores:
+For each bundled problem random charts are tried in MuJoCo, and indices are compared with what happened. Run from the
+root of the repository; all tables take half an hour on two cores, or name some of `indices`, `closed`, `defaults`:
 
-    python docs/make_physics.py
+    python docs/make_physics.py closed defaults
 """
 
 from __future__ import annotations
@@ -26,7 +26,10 @@ SAMPLE, SEED = 120, 1
 WITH_FRICTION = ("force_closure_margin", "ferrari_canny_epsilon", "ferrari_canny_volume", "min_weight", "holding_force")
 SOFT = ("force_closure_margin", "soft_finger_epsilon", "holding_force")
 PAGE = Path(__file__).parent / "physics.md"
-MARKS = ("<!-- tables -->", "<!-- end of tables -->")
+#: Charts of each problem in the other tables, distances of their pregrasps [m], and charts of the hard trials.
+FEWER, DISTANCES, HARD = 60, (0.005, 0.02), 100
+#: What the problems' own fingertips may sink in, now that shapes touch exactly [m].
+TOUCH_DEPTH = 5e-5
 
 
 def area_under_curve(values: np.ndarray, held: np.ndarray) -> float:
@@ -69,8 +72,8 @@ def tried(name: str) -> tuple[ga.Result, ga.Simulation]:
     return result, trials
 
 
-def main() -> None:
-    """Try, compare, write."""
+def compare_indices() -> list[str]:
+    """Every index against what happened to grasps that are free of collision."""
     heads, forces, areas, errors = [], {n: [] for n in INDICES}, {n: [] for n in INDICES}, []
     for name in ga.bundled_problems():
         result, trials = tried(name)
@@ -81,12 +84,76 @@ def main() -> None:
             forces[index].append(rank_correlation(values, broke))
             areas[index].append(area_under_curve(values, held))
         predicted = value_of("holding_force", grasps, trials.friction, trials.torsional)
-        both = (predicted > 0.0) & held
-        error = float(np.median(np.abs(predicted[both] / broke[both] - 1.0))) if both.any() else float("nan")
-        errors.append((name, trials, predicted, error, int(both.sum())))
+        errors.append((name, trials, predicted, median_error(predicted, broke, (predicted > 0.0) & held)))
         heads.append(name)
         print(f"{name}: {int(held.sum())} of {len(held)} held, {trials.seconds:.0f} s", file=sys.stderr)
-    write(heads, forces, areas, errors)
+    return table_of_indices(heads, forces, areas, errors)
+
+
+def median_error(predicted: np.ndarray, broke: np.ndarray, which: np.ndarray) -> float:
+    """Of the breaking force, relative to the prediction's; NaN for none."""
+    return float(np.median(np.abs(broke[which] / predicted[which] - 1.0))) if which.any() else float("nan")
+
+
+def closed_grasps() -> list[str]:
+    """The holding force against the breaking force of grasps that hard fingers close at friction 0.5."""
+    rows = [["problem", "rank correlation", "median error", "simulated by predicted", "held 1 N"]]
+    for name in ga.bundled_problems():
+        require = [ga.ForceClosure(0.5, 0.02), ga.CollisionFree(touch_depth=TOUCH_DEPTH)]
+        result = ga.optimize(ga.load_problem(name), require=require)
+        if not result.accepted.any():
+            continue
+        trials = ga.simulate(result, protocol="shake", sample=FEWER, seed=SEED)
+        grasps = ga.Grasps(result.problem, result.atlas.centers[trials.charts])
+        predicted, broke = ga.quality.holding_force(grasps, 0.5), trials.breaking_forces
+        error = median_error(predicted, broke, predicted > 0.0)
+        ratio = f"{np.median(broke / predicted):.2f}"
+        held = f"{int(trials.held.sum())} of {len(trials)}"
+        rows.append([f"`{name}`", number(rank_correlation(predicted, broke)), f"{100 * error:.0f} %", ratio, held])
+        print(*rows[-1], file=sys.stderr)
+    return lines_of(rows)
+
+
+def default_grasps() -> list[str]:
+    """What the tests of the field say of the bundled problems' accepted charts and refined bests."""
+    near, far = (f"{1e3 * distance:g} mm off" for distance in DISTANCES)
+    rows = [["problem", "refined best", near, far, "distance of contacts at most", "hard, closed at 0.3"]]
+    for name in ga.bundled_problems():
+        problem = ga.load_problem(name)
+        result = ga.optimize(problem, refine=True)
+        best = ga.simulate(result)
+        plain = replace(result, refinement=None)
+        both = [ga.simulate(plain, sample=FEWER, seed=SEED, distance=distance) for distance in DISTANCES]
+        gap = max(float(np.abs(trials.contact_distances).max()) for trials in both)
+        counts = [f"{int(trials.held.sum())} of {len(trials)}" for trials in both]
+        require = [ga.ForceClosure(0.3, 0.02), ga.CollisionFree(touch_depth=TOUCH_DEPTH)]
+        closed, hard = ga.optimize(problem, require=require), "none closes"
+        if closed.accepted.any():
+            trials = ga.simulate(closed, protocol="dexgraspbench-hard", sample=HARD, seed=SEED)
+            hard = f"{int(trials.held.sum())} of {len(trials)}"
+        pushes = f"{int(best.survived[0].sum())} of {best.survived.shape[1]} pushes"
+        rows.append([f"`{name}`", pushes, *counts, f"{1e3 * gap:.2g} mm", hard])
+        print(*rows[-1], file=sys.stderr)
+    return lines_of(rows)
+
+
+TABLES = {"indices": compare_indices, "closed": closed_grasps, "defaults": default_grasps}
+
+
+def main() -> None:
+    """Measure what is asked for, and put it between its marks in the page."""
+    for name in sys.argv[1:] or TABLES:
+        lines = TABLES[name]()
+        start, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
+        before, rest = PAGE.read_text(encoding="utf-8").split(start)
+        _, after = rest.split(end)
+        PAGE.write_text("\n".join([before + start, *lines, end]) + after, encoding="utf-8")
+
+
+def lines_of(rows: list[list[str]]) -> list[str]:
+    """A table whose first row is its head."""
+    lines = ["| " + " | ".join(row) + " |" for row in rows]
+    return [lines[0], "|---" * len(rows[0]) + "|", *lines[1:]]
 
 
 def number(value: float) -> str:
@@ -94,11 +161,11 @@ def number(value: float) -> str:
     return "-" if np.isnan(value) else f"{value:.2f}"
 
 
-def write(heads: list[str], forces: dict, areas: dict, errors: list) -> None:
-    """Put the tables between the marks of the page."""
+def table_of_indices(heads: list[str], forces: dict, areas: dict, errors: list) -> list[str]:
+    """What was tried, then the rank correlations and the areas under the curve."""
     titles = ("problem", "friction", "tried", "held", "closed", "of the closed held", "median error of `holding_force`")
     lines = ["| " + " | ".join(titles) + " |", "|---" * len(titles) + "|"]
-    for name, trials, predicted, error, _ in errors:
+    for name, trials, predicted, error in errors:
         closed = predicted > 0.0
         share = f"{int((closed & trials.held).sum())} of {int(closed.sum())}"
         percent = "-" if np.isnan(error) else f"{100 * error:.0f} %"
@@ -110,10 +177,7 @@ def write(heads: list[str], forces: dict, areas: dict, errors: list) -> None:
         lines.append("|---|" + "---|" * len(heads))
         order = sorted(table, key=lambda index: -np.nanmean([*table[index], -1.0]))
         lines += [f"| `{index}` | " + " | ".join(map(number, table[index])) + " |" for index in order]
-    page = PAGE.read_text(encoding="utf-8")
-    before, rest = page.split(MARKS[0])
-    _, after = rest.split(MARKS[1])
-    PAGE.write_text("\n".join([before + MARKS[0], *lines, MARKS[1]]) + after, encoding="utf-8")
+    return lines
 
 
 if __name__ == "__main__":
