@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "graspatlas/audit/facet_samples.hpp"
-#include "graspatlas/audit/random.hpp"
+#include "graspatlas/random.hpp"
 #include "graspatlas/audit/rank_search.hpp"
 #include "graspatlas/audit/walker.hpp"
 #include "graspatlas/continuation/charts.hpp"

@@ -17,6 +17,7 @@ class CollisionBatch {
   explicit CollisionBatch(std::shared_ptr<const CollisionScene> scene) : scene_(std::move(scene)) {}
 
   const CollisionScene& scene() const { return *scene_; }
+  const std::shared_ptr<const CollisionScene>& shared_scene() const { return scene_; }
 
   /// Calls work(space, row) for each of `count` configurations Q [count x stride], placed there, on up to `threads`
   /// threads. Stops early once `on()`, which is asked now and then on the caller's thread, returns false.

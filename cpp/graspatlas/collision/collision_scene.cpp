@@ -216,6 +216,11 @@ bool CollisionSpace::hit(int pair) {
   return solvers_->collision_result.isCollision();
 }
 
+bool CollisionSpace::may_be_within(int pair, double distance) const {
+  const CollisionPair& stated = scene_->pairs_[static_cast<std::size_t>(pair)];
+  return !apart({stated.first, stated.second, distance});
+}
+
 bool CollisionSpace::free() { return first_hit() < 0; }
 
 int CollisionSpace::first_hit() {

@@ -35,6 +35,8 @@ class CollisionScene {
   const Model& model() const { return model_; }
   int shape_count() const { return static_cast<int>(carriers_.size()); }
   const std::vector<CollisionPair>& pairs() const { return pairs_; }
+  /// Joint that carries a shape.
+  int joint(int shape) const { return carriers_[static_cast<std::size_t>(shape)].joint; }
 
  private:
   friend class CollisionSpace;
@@ -69,6 +71,10 @@ class CollisionSpace {
   bool free();
   /// Number of the first pair that is nearer than it must be, or -1.
   int first_hit();
+  /// Whether a pair is nearer than it must be.
+  bool hit(int pair);
+  /// False when balls or boxes show that a pair is farther apart than `distance` [m]; true says nothing.
+  bool may_be_within(int pair, double distance) const;
   /// Nearest points of a pair. Distances of disjoint shapes are exact to kDistanceTolerance, depths to coal's 1e-6 m.
   NearestPoints nearest(int pair);
   /// Distance of a point [palm] from a shape [m]; negative inside, but for meshes.
@@ -80,7 +86,6 @@ class CollisionSpace {
   struct Solvers;
 
   bool apart(const CollisionPair& pair) const;
-  bool hit(int pair);
   void aim(int pair);
 
   std::shared_ptr<const CollisionScene> scene_;

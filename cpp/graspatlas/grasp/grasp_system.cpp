@@ -390,6 +390,13 @@ void GraspSystem::contact_points(const double* x, ContactPoint* out) {
   });
 }
 
+void GraspSystem::contact_points(const double* x, ContactPoint* out, Eigen::Ref<RowMatrix> Gt) {
+  contact_points(x, out);
+  const Eigen::Vector3d& origin = model_->placement(model_->object_joint_index()).translation;
+  for (int c = 0; c < contact_count(); ++c)
+    object_joint_.point_velocities(out[c].object_point - origin, Gt.middleRows<3>(3 * c));
+}
+
 void GraspSystem::grasp_matrices(const double* x, Eigen::Ref<RowMatrix> J, Eigen::Ref<RowMatrix> Gt) {
   J.setZero();
   Eigen::Index row = 0;

@@ -97,6 +97,8 @@ class GraspSystem : public System {
 
   /// Contact points and normals at x [contact_count].
   void contact_points(const double* x, ContactPoint* out);
+  /// The same with Gt, see below.
+  void contact_points(const double* x, ContactPoint* out, Eigen::Ref<RowMatrix> Gt);
   /// J [3m x actuated_count]: velocities of the actuated joints to those of the contact points, and Gt [3m x
   /// object_dof], the grasp matrix transposed: the object's velocity (linear at its origin, then angular; world axes)
   /// to those of the points.

@@ -14,6 +14,7 @@ constexpr double kGap = 1e-10;     // the margin is found to within this
 constexpr double kGrowth = 12.0;   // of the barrier's weight from one centring to the next
 constexpr double kCentred = 1e-8;  // squared Newton decrement at which a centring ends
 constexpr int kMaxNewtonSteps = 200;
+constexpr int kPolishing = 2;      // more steps, so that multipliers are as exact as the margin
 constexpr double kStartMargin =
     -1.0;  // a barrier starts this far outside the cones, so that it is inside all of its own
 
@@ -82,6 +83,7 @@ double ForceClosure::write_forces(const double* x, double margin, Forces& out) {
 bool ForceClosure::balancing_forces(const double* x, const double* load) {
   system_.grasp_matrices(x, J_, Gt_);
   system_.contact_points(x, points_.data());
+  norms_.setOnes(system_.object_dof() + 1);
   const int contacts = system_.contact_count(), dof = system_.object_dof();
   for (int c = 0; c < contacts; ++c) normals_.col(c).head(directions_) = -points_[c].object_normal.head(directions_);
   const Eigen::Index forces = static_cast<Eigen::Index>(contacts) * force_size_;
@@ -102,6 +104,7 @@ bool ForceClosure::balancing_forces(const double* x, const double* load) {
     const double norm = equations_.col(column).norm();
     if (!(norm > 0.0)) return false;
     if (column == dof) continue;
+    norms_(column) = norm;
     equations_.col(column) /= norm;
     if (load) right(column) = -load[column] / norm;
   }
@@ -151,6 +154,7 @@ double ForceClosure::widest_margin(Aim aim) {
   int steps = 0;
   for (double weight = parameter; parameter / weight > kGap && steps < kMaxNewtonSteps; weight *= kGrowth) {
     while (steps < kMaxNewtonSteps && newton_step(weight)) ++steps;
+    weight_ = weight;
     // The optimum is at most parameter / weight above: outside the cones for good, or known well enough.
     if (aim != Aim::signed_margin && z_(t) + parameter / weight < 0.0) break;
     if (aim == Aim::inside && z_(t) > 0.0) break;
@@ -178,8 +182,8 @@ double ForceClosure::barrier(const Vector& z, double weight) const {
   return value;
 }
 
-// One Newton step with backtracking towards the maximum of the barrier; false when there is nothing left to gain.
-bool ForceClosure::newton_step(double weight) {
+// The Newton step towards the maximum of the barrier as step_; its squared decrement.
+double ForceClosure::newton_direction(double weight) {
   const Eigen::Index n = z_.size();
   gradient_.setZero(n);
   hessian_.setZero(n, n);
@@ -198,7 +202,12 @@ bool ForceClosure::newton_step(double weight) {
   }
   factor_.compute(hessian_);
   step_ = factor_.solve(gradient_);
-  const double decrement = gradient_.dot(step_);
+  return gradient_.dot(step_);
+}
+
+// One step with backtracking; false when there is nothing left to gain.
+bool ForceClosure::newton_step(double weight) {
+  const double decrement = newton_direction(weight);
   if (!(decrement > kCentred)) return false;
   const double here = barrier(z_, weight);
   for (double length = 1.0; length > 1e-12; length *= 0.5) {
@@ -209,6 +218,51 @@ bool ForceClosure::newton_step(double weight) {
     }
   }
   return false;
+}
+
+// L(f, t) = t + sum of (axial multiplier along + tangential multiplier . tangent) over the cones
+//             + equation multipliers . (equations' f - right-hand side); at the centre of the barrier its slope by f is 0.
+void ForceClosure::keep_multipliers() {
+  for (int polish = 0; polish < kPolishing; ++polish) {
+    newton_direction(weight_);
+    next_ = z_ + step_;
+    if (barrier(next_, weight_) == -HUGE_VAL || !next_.allFinite()) break;
+    z_.swap(next_);
+  }
+  forces_ = particular_;
+  forces_.noalias() += basis_ * z_.head(basis_.cols());
+  const int contacts = system_.contact_count();
+  cone_axial_.resize(contacts);
+  cone_tangential_.resize(force_size_, contacts);
+  Vector slope(forces_.size());
+  double along;
+  Force tangent;
+  for (int c = 0; c < contacts; ++c) {
+    const double s = cones_[static_cast<std::size_t>(c)].evaluate(z_, tangent, along);
+    cone_axial_(c) = 2.0 * along / (weight_ * s);
+    cone_tangential_.col(c) = (-2.0 / (weight_ * s)) * tangent;
+    slope.segment(c * force_size_, force_size_) = friction_ * cone_axial_(c) * normals_.col(c) + cone_tangential_.col(c);
+  }
+  equation_multipliers_ = qr_.solve(-slope);
+  equation_multipliers_.array() /= norms_.array();
+}
+
+double ForceClosure::lagrangian(const double* x) {
+  const int contacts = system_.contact_count(), dof = system_.object_dof();
+  system_.contact_points(x, points_.data(), Gt_);
+  Force n = Force::Zero(force_size_);
+  double value = 0.0;
+  for (int c = 0; c < contacts; ++c) {
+    const auto f = forces_.segment(c * force_size_, force_size_);
+    n.head(directions_) = -points_[static_cast<std::size_t>(c)].object_normal.head(directions_);
+    const double normal = n.dot(f);
+    value += friction_ * cone_axial_(c) * normal + cone_tangential_.col(c).dot(f - n * normal);
+    value += equation_multipliers_(dof) * normal;
+    value += f.head(directions_).dot(Gt_.block(3 * c, 0, directions_, dof) * equation_multipliers_.head(dof));
+    if (force_size_ > directions_)
+      value += (torsional_ / friction_) * f(directions_) * n.head<3>().dot(equation_multipliers_.segment<3>(3));
+  }
+  return value;
 }
 
 }  // namespace graspatlas

@@ -54,6 +54,13 @@ class ForceClosure {
   /// stops as soon as it has them. What follows is of the grasp asked for last.
   bool closes(const double* x, Forces& out);
 
+  /// After `slack` or `margin` at x: the multipliers of the programme there, for `lagrangian`.
+  void keep_multipliers();
+
+  /// The Lagrangian of the programme of a grasp nearby, with the forces and multipliers kept: at x its value is the
+  /// margin, and its slope there that of the margin.
+  double lagrangian(const double* x);
+
   const RowMatrix& J() const { return J_; }  ///< [3 contacts x actuated joints]
   const std::vector<ContactPoint>& points() const { return points_; }
 
@@ -77,6 +84,7 @@ class ForceClosure {
   double write_forces(const double* x, double margin, Forces& out);
   double barrier(const Vector& z, double weight) const;
   bool newton_step(double weight);
+  double newton_direction(double weight);
 
   GraspSystem& system_;
   double friction_, torsional_;
@@ -87,6 +95,12 @@ class ForceClosure {
   Matrix basis_;       // of the internal forces with no total normal force, one a column
   Vector particular_;  // forces with total normal force one that balance the load; without one they are internal
   std::vector<ContactPoint> points_;
+
+  // For `lagrangian`: the last weight of the barrier, what the columns of the equations were divided by, the forces, and
+  // the multipliers of cones and equations.
+  double weight_ = 1.0;
+  Vector norms_, forces_, cone_axial_, equation_multipliers_;
+  Matrix cone_tangential_;
 
   // Room to work in, the same for all grasps.
   Matrix equations_, Q_;

@@ -1,0 +1,182 @@
+#include <pybind11/eigen.h>
+#include <pybind11/functional.h>
+#include <pybind11/stl.h>
+
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bindings.hpp"
+#include "graspatlas/climb/climb_batch.hpp"
+#include "graspatlas/climb/index_measures.hpp"
+#include "graspatlas/climb/requirement_measures.hpp"
+#include "graspatlas/clock.hpp"
+#include "graspatlas/collision/collision_batch.hpp"
+#include "graspatlas/errors.hpp"
+#include "graspatlas/parallel.hpp"
+
+namespace py = pybind11;
+
+namespace graspatlas {
+
+namespace {
+
+using PythonFunction = py::typing::Callable<py::array(py::array)>;
+
+AxesIndex axes_index_from(const std::string& name) {
+  if (name == "volume") return AxesIndex::volume;
+  if (name == "inverse_condition_number") return AxesIndex::inverse_condition_number;
+  if (name == "smallest") return AxesIndex::smallest;
+  throw Error("what is read off semi-axes is 'volume', 'inverse_condition_number' or 'smallest', not '" + name + "'");
+}
+
+const char* name_of(ClimbStatus status) {
+  switch (status) {
+    case ClimbStatus::converged:
+      return "converged";
+    case ClimbStatus::stalled:
+      return "stalled";
+    case ClimbStatus::given_up:
+      return "given up";
+    default:
+      return "not met";
+  }
+}
+
+py::array_t<double> copied_rows(const RowMatrix& X) {
+  py::array_t<double> rows = matrix<double>(X.rows(), X.cols());
+  std::copy_n(X.data(), X.size(), rows.mutable_data());
+  return rows;
+}
+
+/// What a function of grasps [n x configuration_size] returns, checked: n numbers.
+DoubleArray asked(const PythonFunction& function, const RowMatrix& X) {
+  DoubleArray values = DoubleArray::ensure(function(copied_rows(X)));
+  if (!values || values.ndim() != 1 || values.shape(0) != X.rows())
+    throw Error("a function of " + std::to_string(X.rows()) + " grasps must return as many numbers");
+  return values;
+}
+
+MeasureRecipe axes_recipe(const std::string& index, int connectivity, double length_unit) {
+  const AxesIndex kind = axes_index_from(index);
+  return {[=](GraspSystem& system) { return std::make_unique<AxesMeasure>(system, kind, connectivity, length_unit); }};
+}
+
+MeasureRecipe closure_recipe(double friction, double torsional, double margin) {
+  return {[=](GraspSystem& system) { return std::make_unique<ClosureMeasure>(system, friction, torsional, margin); }};
+}
+
+MeasureRecipe joint_margin_recipe(double distance) {
+  return {[=](GraspSystem& system) { return std::make_unique<JointMarginMeasure>(system, distance); }};
+}
+
+MeasureRecipe distances_recipe(const std::shared_ptr<CollisionBatch>& batch) {
+  return {[scene = batch->shared_scene()](GraspSystem& system) {
+    return std::make_unique<DistancesMeasure>(scene, system.length_scale());
+  }};
+}
+
+MeasureRecipe numbers_recipe(const PythonFunction& values) {
+  return {[values](GraspSystem& system) {
+            return std::make_unique<BatchMeasure>(system, [values](const RowMatrix& X, double* out) {
+              const py::gil_scoped_acquire acquire;
+              std::copy_n(asked(values, X).data(), X.rows(), out);
+            });
+          },
+          false};
+}
+
+MeasureRecipe test_recipe(const PythonFunction& met) {
+  return {[met](GraspSystem& system) {
+            return std::make_unique<TestMeasure>([met, size = system.configuration_size()](const double* x) {
+              const py::gil_scoped_acquire acquire;
+              return *asked(met, RowMatrix(Eigen::Map<const Eigen::RowVectorXd>(x, size))).data() != 0.0;
+            });
+          },
+          false};
+}
+
+/// The ends of the climbs as arrays, one row or number each; `values` is a list of arrays.
+py::dict table_of(const std::vector<ClimbEnd>& ends, int size) {
+  const auto n = static_cast<py::ssize_t>(ends.size());
+  py::array_t<double> x = matrix<double>(n, size), value(n), missed(n), kkt(n);
+  py::array_t<int> evaluations(n);
+  py::list statuses, values;
+  for (py::ssize_t i = 0; i < n; ++i) {
+    const ClimbEnd& end = ends[static_cast<std::size_t>(i)];
+    std::copy_n(end.x.data(), size, x.mutable_data(i, 0));
+    value.mutable_at(i) = end.value;
+    missed.mutable_at(i) = end.missed;
+    kkt.mutable_at(i) = end.kkt;
+    evaluations.mutable_at(i) = end.evaluations;
+    statuses.append(name_of(end.status));
+    values.append(py::array_t<double>(static_cast<py::ssize_t>(end.values.size()), end.values.data()));
+  }
+  py::dict table;
+  table["x"] = x;
+  table["value"] = value;
+  table["missed"] = missed;
+  table["kkt"] = kkt;
+  table["evaluations"] = evaluations;
+  table["status"] = statuses;
+  table["values"] = values;
+  return table;
+}
+
+py::dict climbs(GraspSystem& system, const DoubleArray& X, const MeasureRecipe& index,
+                const std::vector<MeasureRecipe>& requirements, double trust_radius, int max_steps,
+                std::optional<double> max_seconds, std::optional<int> threads) {
+  if (X.ndim() != 2 || X.shape(1) != system.configuration_size())
+    throw Error("X must have " + std::to_string(system.configuration_size()) + " columns, one row for each grasp");
+  if (!(trust_radius > 0.0) || !std::isfinite(trust_radius))
+    throw Error("trust_radius must be positive, got " + to_text(trust_radius));
+  const Clock::time_point start = Clock::now();
+  Clock::time_point looked = start;
+  bool interrupted = false;
+  const auto on = [&] {
+    const Clock::time_point now = Clock::now();
+    if (max_seconds && std::chrono::duration<double>(now - start).count() > *max_seconds) return false;
+    if (interrupted || now - looked < std::chrono::milliseconds(50)) return !interrupted;
+    looked = now;
+    const py::gil_scoped_acquire acquire;
+    interrupted = PyErr_CheckSignals() != 0;
+    return !interrupted;
+  };
+  std::vector<ClimbEnd> ends;
+  {
+    const py::gil_scoped_release release;
+    ends = climb_all(system, X.data(), X.shape(0), index, requirements, {trust_radius, max_steps},
+                     threads.value_or(available_threads()), on);
+  }
+  if (interrupted) throw py::error_already_set();
+  return table_of(ends, system.configuration_size());
+}
+
+}  // namespace
+
+void bind_climb(py::module_& module) {
+  py::class_<MeasureRecipe>(module, "Measure", "An index or requirement that climbs follow; see climb/measure.hpp.")
+      .def_readonly("any_thread", &MeasureRecipe::any_thread, "False where it asks Python.");
+  module.def("axes_measure", &axes_recipe, py::arg("index"), py::arg("connectivity"), py::arg("length_unit"),
+             "An index of the manipulability ellipsoid; see climb/index_measures.hpp.");
+  module.def("closure_measure", &closure_recipe, py::arg("friction"), py::arg("torsional") = 0.0,
+             py::arg("margin") = 0.0, "The force-closure margin beyond one that is asked for.");
+  module.def("joint_margin_measure", &joint_margin_recipe, py::arg("distance"),
+             "Distances of the joints from their limits beyond one that is asked for.");
+  module.def("distances_measure", &distances_recipe, py::arg("batch"), "Distances of hand and object.");
+  module.def("numbers_measure", &numbers_recipe, py::arg("values"),
+             "An index that is a function of grasps [n x configuration_size] that returns numbers [n].");
+  module.def("test_measure", &test_recipe, py::arg("met"),
+             "A requirement that is a function of grasps [n x configuration_size] that returns flags [n].");
+  module.def("climbs", &climbs, py::arg("system"), py::arg("X"), py::arg("index"), py::arg("requirements"),
+             py::arg("trust_radius"), py::arg("max_steps"), py::arg("max_seconds") = py::none(),
+             py::arg("threads") = py::none(),
+             "Climbs from each grasp of X [n x configuration_size] to a local maximum of the index within bounds and "
+             "requirements: ends x [n x configuration_size], value, missed, kkt and evaluations [n], and lists of status "
+             "and of values. See climb/climber.hpp.");
+}
+
+}  // namespace graspatlas

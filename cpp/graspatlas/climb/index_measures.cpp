@@ -1,0 +1,57 @@
+#include "graspatlas/climb/index_measures.hpp"
+
+#include "graspatlas/errors.hpp"
+
+namespace graspatlas {
+
+void NumberMeasure::linearize(const Surroundings& at, double, Rows& rows) {
+  double* slopes = rows.add(0, value(at.x()));
+  for (int i = 0; i < at.dimension(); ++i) slopes[i] = Surroundings::slope(value(at.ahead(i)), value(at.behind(i)));
+}
+
+bool NumberMeasure::revisit(const double* x, double* values) {
+  *values = value(x);
+  return true;
+}
+
+AxesMeasure::AxesMeasure(GraspSystem& system, AxesIndex index, int connectivity, double length_unit)
+    : manipulability_(system, length_unit), index_(index), connectivity_(connectivity), axes_(system.object_dof()) {
+  if (connectivity < 0 || connectivity > system.object_dof())
+    throw Error("an object with " + std::to_string(system.object_dof()) + " degrees of freedom has no connectivity " +
+                std::to_string(connectivity));
+}
+
+double AxesMeasure::value(const double* x) {
+  if (connectivity_ == 0) return 0.0;
+  manipulability_.semi_axes(x, axes_.data());
+  const auto axes = axes_.tail(connectivity_);
+  if (index_ == AxesIndex::volume) return axes.prod();
+  if (index_ == AxesIndex::smallest) return axes(0);
+  return axes(connectivity_ - 1) > 0.0 ? axes(0) / axes(connectivity_ - 1) : 0.0;
+}
+
+BatchMeasure::BatchMeasure(const GraspSystem& system, BatchFunction values)
+    : values_(std::move(values)),
+      X_(2 * system.dimension() + 1, system.configuration_size()),
+      results_(2 * system.dimension() + 1) {}
+
+void BatchMeasure::linearize(const Surroundings& at, double, Rows& rows) {
+  const int k = at.dimension();
+  const auto row_of = [&](const double* x) { return Eigen::Map<const Eigen::RowVectorXd>(x, X_.cols()); };
+  X_.row(2 * k) = row_of(at.x());
+  for (int i = 0; i < k; ++i) {
+    X_.row(2 * i) = row_of(at.ahead(i));
+    X_.row(2 * i + 1) = row_of(at.behind(i));
+  }
+  values_(X_, results_.data());
+  double* slopes = rows.add(0, results_(2 * k));
+  for (int i = 0; i < k; ++i) slopes[i] = Surroundings::slope(results_(2 * i), results_(2 * i + 1));
+}
+
+bool BatchMeasure::revisit(const double* x, double* values) {
+  const RowMatrix one = Eigen::Map<const Eigen::RowVectorXd>(x, X_.cols());
+  values_(one, values);
+  return true;
+}
+
+}  // namespace graspatlas

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "graspatlas/climb/measure.hpp"
+#include "graspatlas/grasp/grasp_system.hpp"
+#include "graspatlas/quality/manipulability.hpp"
+
+namespace graspatlas {
+
+/// A number that is read off a grasp, with slopes by central differences.
+class NumberMeasure : public Measure {
+ public:
+  void linearize(const Surroundings& at, double reach, Rows& rows) override;
+  bool revisit(const double* x, double* values) override;
+
+ protected:
+  virtual double value(const double* x) = 0;
+};
+
+/// What is read off the semi-axes of the manipulability ellipsoid.
+enum class AxesIndex { volume, inverse_condition_number, smallest };
+
+/// An index of the manipulability ellipsoid, over the largest `connectivity` semi-axes: zero where one of them is lost.
+class AxesMeasure : public NumberMeasure {
+ public:
+  AxesMeasure(GraspSystem& system, AxesIndex index, int connectivity, double length_unit);
+
+ protected:
+  double value(const double* x) override;
+
+ private:
+  Manipulability manipulability_;
+  AxesIndex index_;
+  int connectivity_;
+  Vector axes_;
+};
+
+/// Numbers of grasps X [n x configuration_size] that somebody else computes, as a function in Python.
+using BatchFunction = std::function<void(const RowMatrix& X, double* values)>;
+
+/// A number that is computed for whole batches of grasps.
+class BatchMeasure : public Measure {
+ public:
+  BatchMeasure(const GraspSystem& system, BatchFunction values);
+  void linearize(const Surroundings& at, double reach, Rows& rows) override;
+  bool revisit(const double* x, double* values) override;
+
+ private:
+  BatchFunction values_;
+  RowMatrix X_;
+  Vector results_;
+};
+
+}  // namespace graspatlas
