@@ -126,13 +126,15 @@ py::dict table_of(const std::vector<ClimbEnd>& ends, int size) {
   return table;
 }
 
-py::dict climbs(GraspSystem& system, const DoubleArray& X, const MeasureRecipe& index,
-                const std::vector<MeasureRecipe>& requirements, double trust_radius, int max_steps,
-                std::optional<double> max_seconds, std::optional<int> threads) {
+/// X, checked: rows of a system's size.
+void check_rows(const GraspSystem& system, const DoubleArray& X) {
   if (X.ndim() != 2 || X.shape(1) != system.configuration_size())
     throw Error("X must have " + std::to_string(system.configuration_size()) + " columns, one row for each grasp");
-  if (!(trust_radius > 0.0) || !std::isfinite(trust_radius))
-    throw Error("trust_radius must be positive, got " + to_text(trust_radius));
+}
+
+/// work(on) without the GIL; `on` is false after so many seconds, or after Ctrl-C, which then is raised.
+template <class Work>
+void until(std::optional<double> max_seconds, const Work& work) {
   const Clock::time_point start = Clock::now();
   Clock::time_point looked = start;
   bool interrupted = false;
@@ -145,14 +147,34 @@ py::dict climbs(GraspSystem& system, const DoubleArray& X, const MeasureRecipe& 
     interrupted = PyErr_CheckSignals() != 0;
     return !interrupted;
   };
-  std::vector<ClimbEnd> ends;
   {
     const py::gil_scoped_release release;
-    ends = climb_all(system, X.data(), X.shape(0), index, requirements, {trust_radius, max_steps},
-                     threads.value_or(available_threads()), on);
+    work(on);
   }
   if (interrupted) throw py::error_already_set();
+}
+
+py::dict climbs(GraspSystem& system, const DoubleArray& X, const MeasureRecipe& index,
+                const std::vector<MeasureRecipe>& requirements, double trust_radius, int max_steps,
+                std::optional<double> max_seconds, std::optional<int> threads) {
+  check_rows(system, X);
+  if (!(trust_radius > 0.0) || !std::isfinite(trust_radius))
+    throw Error("trust_radius must be positive, got " + to_text(trust_radius));
+  std::vector<ClimbEnd> ends;
+  until(max_seconds, [&](const auto& on) {
+    ends = climb_all(system, X.data(), X.shape(0), index, requirements, {trust_radius, max_steps},
+                     threads.value_or(available_threads()), on);
+  });
   return table_of(ends, system.configuration_size());
+}
+
+py::array_t<double> missed(GraspSystem& system, const DoubleArray& X, const std::vector<MeasureRecipe>& requirements) {
+  check_rows(system, X);
+  std::vector<double> found;
+  until(std::nullopt, [&](const auto& on) {
+    found = missed_by_all(system, X.data(), X.shape(0), requirements, available_threads(), on);
+  });
+  return py::array_t<double>(static_cast<py::ssize_t>(found.size()), found.data());
 }
 
 }  // namespace
@@ -177,6 +199,9 @@ void bind_climb(py::module_& module) {
              "Climbs from each grasp of X [n x configuration_size] to a local maximum of the index within bounds and "
              "requirements: ends x [n x configuration_size], value, missed, kkt and evaluations [n], and lists of status "
              "and of values. See climb/climber.hpp.");
+  module.def("missed", &missed, py::arg("system"), py::arg("X"), py::arg("requirements"),
+             "By how much each grasp of X misses the requirement that it misses most, in about units of the tangent "
+             "space [n]; infinite where a requirement that is met or not is not met.");
 }
 
 }  // namespace graspatlas

@@ -24,4 +24,9 @@ std::vector<ClimbEnd> climb_all(GraspSystem& system, const double* X, std::int64
                                 const std::vector<MeasureRecipe>& requirements, const ClimbOptions& options,
                                 int threads, const std::function<bool()>& on);
 
+/// By how much each grasp misses the requirement that it misses most [count]; 0 where it meets all.
+std::vector<double> missed_by_all(GraspSystem& system, const double* X, std::int64_t count,
+                                  const std::vector<MeasureRecipe>& requirements, int threads,
+                                  const std::function<bool()>& on);
+
 }  // namespace graspatlas

@@ -14,6 +14,9 @@ constexpr int kIdsOfRequirement = 1 << 20;  // more than any requirement has row
 // Of the penalty: where it starts, and the most that it becomes. [relative gain of the index for a unit missed]
 constexpr double kFirstPenalty = 10.0, kLargestPenalty = 1e8;
 constexpr double kLeastProgress = 0.1;      // share of what is missed that a step must promise to repair
+// A repair goes on while each so many steps leave less than this share of what was missed before.
+constexpr int kRepairSteps = 10;
+constexpr double kRepairShare = 0.8;
 constexpr double kAccepted = 1e-4;          // share of the promised gain that a step must give
 constexpr double kRounding = 1e-11;         // of gains
 constexpr double kMet = 0.5e-8;             // a slack may miss the inside of a requirement by so much
@@ -25,6 +28,7 @@ constexpr double kKinkSize = 1e-5;          // at most so far from a kink its sl
 constexpr std::size_t kMostCuts = 60;
 constexpr int kChallenges = 3;              // times that a maximum may prove to be none
 constexpr double kChallengeGain = 1e-8;     // of the index, relative, that shows it
+constexpr double kSameEnd = 1e-6;           // relative difference of indices that rounding of requirements makes
 
 }  // namespace
 
@@ -47,10 +51,24 @@ Climber::Climber(System& system, Measure& index, std::vector<Measure*> requireme
 ClimbEnd Climber::climb(const double* x, const std::function<bool()>& on) {
   if (begin(x)) {
     status_ = ClimbStatus::given_up;
-    for (int steps = 0; steps < options_.max_steps && on(); ++steps)
+    double missed_before = HUGE_VAL;
+    for (int steps = 0; steps < options_.max_steps && on(); ++steps) {
+      if (repairing_ && steps % kRepairSteps == 0) {
+        if (current_.missed > kRepairShare * missed_before) {
+          status_ = ClimbStatus::not_met;
+          break;
+        }
+        missed_before = current_.missed;
+      }
       if (step() == Outcome::ended) break;
+    }
   }
   return end();
+}
+
+double Climber::missed(const double* x) {
+  if (!begin(x)) return HUGE_VAL;
+  return current_.blocked ? HUGE_VAL : std::max(current_.missed, 0.0);
 }
 
 bool Climber::begin(const double* x) {
@@ -375,7 +393,7 @@ void Climber::keep_if_best() {
 
 ClimbEnd Climber::end() const {
   const bool current_is_met = !repairing_ && !current_.blocked && current_.missed <= kMet;
-  const bool best_is_better = has_best_ && (!current_is_met || best_.value > current_.value + 1e-9 * std::abs(best_.value));
+  const bool best_is_better = has_best_ && (!current_is_met || best_.value > current_.value + kSameEnd * std::abs(best_.value));
   const Point& point = best_is_better ? best_ : current_;
   ClimbEnd found{point.x, point.value, 0.0, kkt_, status_, values_, evaluations_};
   if (!has_best_) {

@@ -56,6 +56,9 @@ class Climber {
   /// From x on the manifold; `on` is asked at each step whether to go on.
   ClimbEnd climb(const double* x, const std::function<bool()>& on);
 
+  /// By how much the requirement that is missed most is missed at x, on the manifold; infinite where one has no number.
+  double missed(const double* x);
+
   static constexpr double kConverged = 1e-6;  ///< largest residual of a climb that has converged
 
  private:

@@ -7,7 +7,8 @@ namespace graspatlas {
 
 namespace {
 
-constexpr double kLeastExcess = -1.0;   // of a closure that is no closure at all
+constexpr double kFarOpen = -1.0;       // below this the slack of closure counts by its logarithm
+constexpr double kLeastSlack = -1e6;    // where internal forces cannot press at all
 constexpr double kApart = 1e-5;         // kept beyond the distance asked for: shapes that touch have no normal [m]
 constexpr double kTouching = 1e-5;      // a fingertip this near the object touches it where it should [m]
 
@@ -68,16 +69,21 @@ bool JointMarginMeasure::revisit(const double* x, double* values) {
 ClosureMeasure::ClosureMeasure(GraspSystem& system, double friction, double torsional, double margin)
     : closure_(system, friction, torsional), margin_(margin + kInside) {}
 
-double ClosureMeasure::excess(double slack) const { return std::max(slack, kLeastExcess) - margin_; }
+// Where hardly any internal force presses the slack falls without bound; steps are those of its logarithm there.
+double ClosureMeasure::excess(double slack) const {
+  const double bounded = std::max(slack, kLeastSlack);
+  return (bounded >= kFarOpen ? bounded : kFarOpen - std::log(-bounded)) - margin_;
+}
 
 void ClosureMeasure::linearize(const Surroundings& at, double, Rows& rows) {
   const double slack = closure_.slack(at.x());
   double* slopes = rows.add(0, excess(slack));
   std::fill_n(slopes, at.dimension(), 0.0);
-  if (!(slack > kLeastExcess)) return;
+  if (!(slack > kLeastSlack)) return;
   closure_.keep_multipliers();
+  const double factor = slack >= kFarOpen ? 1.0 : -1.0 / slack;
   for (int i = 0; i < at.dimension(); ++i)
-    slopes[i] = Surroundings::slope(closure_.lagrangian(at.ahead(i)), closure_.lagrangian(at.behind(i)));
+    slopes[i] = factor * Surroundings::slope(closure_.lagrangian(at.ahead(i)), closure_.lagrangian(at.behind(i)));
 }
 
 bool ClosureMeasure::revisit(const double* x, double* values) {
