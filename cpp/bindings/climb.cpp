@@ -25,6 +25,8 @@ namespace graspatlas {
 namespace {
 
 using PythonFunction = py::typing::Callable<py::array(py::array)>;
+/// Of one grasp [1 x configuration_size]: a function of grasps near it that returns rows of numbers.
+using NearFunction = py::typing::Callable<PythonFunction(py::array)>;
 
 AxesIndex axes_index_from(const std::string& name) {
   if (name == "volume") return AxesIndex::volume;
@@ -52,12 +54,28 @@ py::array_t<double> copied_rows(const RowMatrix& X) {
   return rows;
 }
 
-/// What a function of grasps [n x configuration_size] returns, checked: n numbers.
-DoubleArray asked(const PythonFunction& function, const RowMatrix& X) {
-  DoubleArray values = DoubleArray::ensure(function(copied_rows(X)));
-  if (!values || values.ndim() != 1 || values.shape(0) != X.rows())
-    throw Error("a function of " + std::to_string(X.rows()) + " grasps must return as many numbers");
-  return values;
+/// What a function of grasps [n x configuration_size] returns, checked: n rows of numbers; one a row for `flat` ones.
+RowMatrix asked(const py::object& function, const RowMatrix& X, bool flat) {
+  const DoubleArray values = DoubleArray::ensure(function(copied_rows(X)));
+  if (!values || values.ndim() != (flat ? 1 : 2) || values.shape(0) != X.rows())
+    throw Error("a function of " + std::to_string(X.rows()) + " grasps must return " + (flat ? "a number" : "a row") +
+                " for each");
+  return Eigen::Map<const RowMatrix>(values.data(), X.rows(), flat ? 1 : values.shape(1));
+}
+
+/// A function of Python that may be kept and let go of by threads that do not hold the GIL.
+std::shared_ptr<py::object> kept(const py::object& function) {
+  return {new py::object(function), [](py::object* object) {
+            const py::gil_scoped_acquire acquire;
+            delete object;
+          }};
+}
+
+RowsFunction rows_function(const py::object& function, bool flat) {
+  return [function = kept(function), flat](const RowMatrix& X) {
+    const py::gil_scoped_acquire acquire;
+    return asked(*function, X, flat);
+  };
 }
 
 MeasureRecipe axes_recipe(const std::string& index, int connectivity, double length_unit) {
@@ -67,6 +85,10 @@ MeasureRecipe axes_recipe(const std::string& index, int connectivity, double len
 
 MeasureRecipe closure_recipe(double friction, double torsional, double margin) {
   return {[=](GraspSystem& system) { return std::make_unique<ClosureMeasure>(system, friction, torsional, margin); }};
+}
+
+MeasureRecipe closure_index_recipe(double friction) {
+  return closure_recipe(friction, 0.0, -kInside);  // no margin at all
 }
 
 MeasureRecipe joint_margin_recipe(double distance) {
@@ -80,20 +102,26 @@ MeasureRecipe distances_recipe(const std::shared_ptr<CollisionBatch>& batch) {
 }
 
 MeasureRecipe numbers_recipe(const PythonFunction& values) {
-  return {[values](GraspSystem& system) {
-            return std::make_unique<BatchMeasure>(system, [values](const RowMatrix& X, double* out) {
+  return {[rows = rows_function(values, true)](GraspSystem& system) {
+            return std::make_unique<BatchMeasure>(system, [rows](const RowMatrix&) { return rows; });
+          },
+          false};
+}
+
+MeasureRecipe slacks_recipe(const NearFunction& near) {
+  return {[near = kept(near)](GraspSystem& system) {
+            return std::make_unique<BatchMeasure>(system, [near](const RowMatrix& x) {
               const py::gil_scoped_acquire acquire;
-              std::copy_n(asked(values, X).data(), X.rows(), out);
+              return rows_function((*near)(copied_rows(x)), false);
             });
           },
           false};
 }
 
 MeasureRecipe test_recipe(const PythonFunction& met) {
-  return {[met](GraspSystem& system) {
-            return std::make_unique<TestMeasure>([met, size = system.configuration_size()](const double* x) {
-              const py::gil_scoped_acquire acquire;
-              return *asked(met, RowMatrix(Eigen::Map<const Eigen::RowVectorXd>(x, size))).data() != 0.0;
+  return {[rows = rows_function(met, true)](GraspSystem& system) {
+            return std::make_unique<TestMeasure>([rows, size = system.configuration_size()](const double* x) {
+              return rows(Eigen::Map<const Eigen::RowVectorXd>(x, size))(0, 0) != 0.0;
             });
           },
           false};
@@ -186,11 +214,16 @@ void bind_climb(py::module_& module) {
              "An index of the manipulability ellipsoid; see climb/index_measures.hpp.");
   module.def("closure_measure", &closure_recipe, py::arg("friction"), py::arg("torsional") = 0.0,
              py::arg("margin") = 0.0, "The force-closure margin beyond one that is asked for.");
+  module.def("closure_index_measure", &closure_index_recipe, py::arg("friction"),
+             "The force-closure margin as an index, with its sign.");
   module.def("joint_margin_measure", &joint_margin_recipe, py::arg("distance"),
              "Distances of the joints from their limits beyond one that is asked for.");
   module.def("distances_measure", &distances_recipe, py::arg("batch"), "Distances of hand and object.");
   module.def("numbers_measure", &numbers_recipe, py::arg("values"),
              "An index that is a function of grasps [n x configuration_size] that returns numbers [n].");
+  module.def("slacks_measure", &slacks_recipe, py::arg("near"),
+             "A requirement's slacks: a function of one grasp [1 x configuration_size] that returns a function of grasps "
+             "near it [n x configuration_size], which returns slacks [n x c].");
   module.def("test_measure", &test_recipe, py::arg("met"),
              "A requirement that is a function of grasps [n x configuration_size] that returns flags [n].");
   module.def("climbs", &climbs, py::arg("system"), py::arg("X"), py::arg("index"), py::arg("requirements"),

@@ -30,10 +30,8 @@ double AxesMeasure::value(const double* x) {
   return axes(connectivity_ - 1) > 0.0 ? axes(0) / axes(connectivity_ - 1) : 0.0;
 }
 
-BatchMeasure::BatchMeasure(const GraspSystem& system, BatchFunction values)
-    : values_(std::move(values)),
-      X_(2 * system.dimension() + 1, system.configuration_size()),
-      results_(2 * system.dimension() + 1) {}
+BatchMeasure::BatchMeasure(const GraspSystem& system, std::function<RowsFunction(const RowMatrix& x)> near)
+    : near_(std::move(near)), X_(2 * system.dimension() + 1, system.configuration_size()) {}
 
 void BatchMeasure::linearize(const Surroundings& at, double, Rows& rows) {
   const int k = at.dimension();
@@ -43,14 +41,17 @@ void BatchMeasure::linearize(const Surroundings& at, double, Rows& rows) {
     X_.row(2 * i) = row_of(at.ahead(i));
     X_.row(2 * i + 1) = row_of(at.behind(i));
   }
-  values_(X_, results_.data());
-  double* slopes = rows.add(0, results_(2 * k));
-  for (int i = 0; i < k; ++i) slopes[i] = Surroundings::slope(results_(2 * i), results_(2 * i + 1));
+  values_ = near_(X_.bottomRows(1));
+  const RowMatrix values = values_(X_);
+  for (int c = 0; c < values.cols(); ++c) {
+    double* slopes = rows.add(c, values(2 * k, c));
+    for (int i = 0; i < k; ++i) slopes[i] = Surroundings::slope(values(2 * i, c), values(2 * i + 1, c));
+  }
 }
 
 bool BatchMeasure::revisit(const double* x, double* values) {
-  const RowMatrix one = Eigen::Map<const Eigen::RowVectorXd>(x, X_.cols());
-  values_(one, values);
+  const RowMatrix found = values_(Eigen::Map<const Eigen::RowVectorXd>(x, X_.cols()));
+  Eigen::Map<Eigen::RowVectorXd>(values, found.cols()) = found.row(0);
   return true;
 }
 

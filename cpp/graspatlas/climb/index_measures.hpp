@@ -37,20 +37,21 @@ class AxesMeasure : public NumberMeasure {
   Vector axes_;
 };
 
-/// Numbers of grasps X [n x configuration_size] that somebody else computes, as a function in Python.
-using BatchFunction = std::function<void(const RowMatrix& X, double* values)>;
+/// Rows of numbers [n x c] of grasps X [n x configuration_size] that somebody else computes, as a function in Python.
+using RowsFunction = std::function<RowMatrix(const RowMatrix& X)>;
 
-/// A number that is computed for whole batches of grasps.
+/// Numbers that are computed for whole batches of grasps, by a function that is made anew near each grasp
+/// [1 x configuration_size].
 class BatchMeasure : public Measure {
  public:
-  BatchMeasure(const GraspSystem& system, BatchFunction values);
+  BatchMeasure(const GraspSystem& system, std::function<RowsFunction(const RowMatrix& x)> near);
   void linearize(const Surroundings& at, double reach, Rows& rows) override;
   bool revisit(const double* x, double* values) override;
 
  private:
-  BatchFunction values_;
+  std::function<RowsFunction(const RowMatrix& x)> near_;
+  RowsFunction values_;
   RowMatrix X_;
-  Vector results_;
 };
 
 }  // namespace graspatlas

@@ -10,31 +10,24 @@ grasp". This module lets you test that on your own result::
 
 from __future__ import annotations
 
-import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from graspatlas.analysis.local_model import LocalModel, Objective
+from graspatlas.analysis.objective import BOUND_TOLERANCE, Ends, Objective
 from graspatlas.analysis.unbounded import followed, is_sharp, levels_around, never_levels_off, rises_towards_one_point
 from graspatlas.errors import GraspAtlasError
-from graspatlas.quality.evaluation import evaluate
 from graspatlas.result.grasp_atlas import GraspAtlas, check_is_result
 from graspatlas.support.arrays import Array
-from graspatlas.support.deadlines import deadline_after
-from graspatlas.support.validation import number_array, shown, whole
+from graspatlas.support.validation import number_array, positive, shown, whole
 
-__all__ = ["MAX_STEPS", "Climb", "climb"]
+__all__ = ["MAX_STEPS", "Climb", "climb", "climbs_from", "climbs_of"]
 
 
 #: Steps after which a climb is given up.
 MAX_STEPS = 200
-#: After so many steps each time a climb checks whether it runs after an index that grows without bound.
-CHECK_EVERY = 50
-#: A climb ends when nothing at this share of the chart radius is better.
-SMALLEST_TRUST = 1e-3
 #: Numbers of a grasp are smaller, so that their squares do not overflow.
 LARGEST = 1e100
 #: How far a start may miss its equations and be outside its bounds.
@@ -48,11 +41,16 @@ class Climb:
     Attributes:
         chart: Chart at whose centre it started; -1 when it started elsewhere.
         x: Where it ended [configuration_size].
-        qualities: The index at the start and after each step; never decreasing.
-        converged: True when it ended at a maximum; False when it was given up after the largest number of steps, or the
-            longest time, or ran after an index that has no maximum there.
+        qualities: The index at the start and after each step. It may fall on the way, where a step makes good what
+            the one before missed of a requirement, but not below the start in the end.
+        converged: True when it ended at a maximum: the slope of the index is zero there, or held back by bounds and
+            requirements, so that ``kkt`` is at most 1e-6. False when it was given up after the largest number of steps,
+            or the longest time, came to a place where no step gains but slopes do not agree, or ran after an index that
+            has no maximum there.
         unbounded: True when the index grows without bound where it went, as far as numbers can tell; see
             :mod:`graspatlas.analysis.unbounded`.
+        kkt: Largest residual of the conditions of Karush, Kuhn and Tucker where it ended, of the logarithm of the index
+            [per unit of the tangent space].
     """
 
     chart: int
@@ -60,6 +58,7 @@ class Climb:
     qualities: Array
     converged: bool
     unbounded: bool = False
+    kkt: float = float("nan")
 
     def __repr__(self) -> str:
         end = "converged" if self.converged else "given up"
@@ -86,17 +85,16 @@ def climb(
 ) -> Climb:
     """Climb to a local maximum of the index, on the manifold, within its bounds and the result's requirements.
 
-    In the tangent space of the current grasp, SLSQP of SciPy maximises the index of the projected point over the
-    tangent coordinates, in a box as wide as the chart radius. Its result becomes the next grasp if it is better; if
-    not, the best of a ring of points does; if none is better, the box shrinks. The climb ends when the box is a
-    thousandth of the radius. Where it ends the index is looked at on ever smaller rings, which tell a maximum from an
-    index that grows without bound.
+    The compiled core climbs by sequential quadratic programming in the tangent spaces of the grasps that it passes, with
+    bounds and requirements as constraints: see ``cpp/graspatlas/climb/climber.hpp``. It ends where the index has no
+    slope that they do not hold back, and where no grasp of a sample around is better. An index or a requirement that is
+    a function of yours is asked by the core.
 
     Args:
         result: The result; its index may be any callable.
         start: Number of the chart at whose centre to start, or a grasp [configuration_size].
         all_motions: Climb in all t dimensions of F, no hand motion frozen but the couplings, instead of in R.
-        max_steps: Steps after which the climb is given up; earlier where the index grows without bound.
+        max_steps: Steps after which the climb is given up.
         max_seconds: Time after which the climb is given up, at the end of a step; none by default.
 
     Returns:
@@ -108,7 +106,8 @@ def climb(
     """
     check_is_result(result)
     whole(max_steps, "max_steps")
-    deadline = deadline_after(max_seconds)
+    if max_seconds is not None:
+        positive(max_seconds, "max_seconds")
     objective = Objective.of(result, all_motions)
     chart, x = _start(result, start)
     residual = float(np.abs(objective.system.evaluate_residual(x)).max(initial=0.0))
@@ -118,43 +117,59 @@ def climb(
             f"the grasp misses its equations by {residual:.3g} and its bounds by {max(outside, 0.0):.3g}; "
             "project it before you climb from it, see Atlas.point"
         )
-    if not objective.meets(x):
+    if outside <= BOUND_TOLERANCE and not objective.meets(x[None])[0]:
         name = f"chart {chart}" if chart >= 0 else "the grasp"
         raise GraspAtlasError(f"{name} does not meet the requirements; start from one that does, see result.accepted")
-    value = float(evaluate(result.quality, objective.grasps(x))[0])
-    trust_radius = objective.radius
-    qualities = [value]
-    while trust_radius > SMALLEST_TRUST * objective.radius and len(qualities) <= max_steps:
-        if time.perf_counter() >= deadline:
-            break
-        model = LocalModel(objective, x, value, trust_radius)
-        better = model.optimise() or model.poll()
-        if better is None:
-            trust_radius *= 0.3
-            continue
-        x, value = better
-        qualities.append(value)
-        if (len(qualities) - 1) % CHECK_EVERY == 0 and rises_towards_one_point(_levels(objective, x, value)):
-            break
-    return _ended(objective, Climb(chart, x, np.array(qualities), trust_radius <= SMALLEST_TRUST * objective.radius))
+    return climbs_from(objective, x[None], [chart], max_steps, max_seconds)[0]
 
 
-def _levels(objective: Objective, x: Array, value: float) -> Array:
-    return levels_around(partial(LocalModel, objective), x, value, objective.radius)
+def climbs_from(
+    objective: Objective, X: Array, charts: Sequence[int], max_steps: int, max_seconds: float | None = None
+) -> list[Climb]:
+    """Climbs from grasps that meet the requirements, or are so near to them that the climbs repair that.
+
+    Args:
+        objective: What is maximised.
+        X: The grasps [n, configuration_size].
+        charts: Chart of each, -1 for none.
+        max_steps: Steps after which a climb is given up.
+        max_seconds: Time after which all are; none by default.
+
+    Returns:
+        A climb for each; one that never met the requirements stays where it started.
+    """
+    ends = objective.climbs(X, max_steps, max_seconds)
+    return climbs_of(objective, X, charts, ends)
 
 
-def _ended(objective: Objective, end: Climb) -> Climb:
-    """A climb that ended, with whether the index has a maximum there."""
-    levels = _levels(objective, end.x, end.quality)
-    if not end.converged:
-        return replace(end, unbounded=rises_towards_one_point(levels))
+def climbs_of(objective: Objective, X: Array, charts: Sequence[int], ends: Ends) -> list[Climb]:
+    """Ends of climbs in the core as climbs, whether the index has a maximum there, checked."""
+    values = objective.values(X)
+    found = []
+    for i, chart in enumerate(charts):
+        end = Climb(int(chart), X[i], values[i : i + 1], False)
+        # Where it ended is asked again, by the code that says what grasps are accepted.
+        if ends.status[i] != "not met" and objective.meets(ends.x[i : i + 1])[0]:
+            qualities = np.concatenate([values[i : i + 1], ends.values[i][1:]])
+            qualities[-1] = objective.values(ends.x[i : i + 1])[0]
+            end = Climb(int(chart), ends.x[i], qualities, ends.status[i] == "converged", kkt=float(ends.kkt[i]))
+        found.append(_judged(objective, end))
+    return found
+
+
+def _judged(objective: Objective, end: Climb) -> Climb:
+    """A climb with whether it ran after an index without a maximum: only one that has not converged can have."""
+    if end.converged:
+        return end
+    levels = levels_around(objective, end.x, end.quality)
+    if rises_towards_one_point(levels):
+        return replace(end, unbounded=True)
     if is_sharp(levels):
-        x, value = followed(partial(LocalModel, objective), end.x, end.quality, objective.radius)
+        x, value = followed(objective, end.x, end.quality)
         if value > end.quality:
             end = replace(end, x=x, qualities=np.append(end.qualities, value))
-            levels = _levels(objective, x, value)
-        unbounded = never_levels_off(levels)
-        return replace(end, converged=not unbounded, unbounded=unbounded)
+            levels = levels_around(objective, x, value)
+        return replace(end, unbounded=never_levels_off(levels))
     return end
 
 

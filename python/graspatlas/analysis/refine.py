@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from graspatlas.analysis.climb import MAX_STEPS, Climb, climb
+from graspatlas.analysis.climb import MAX_STEPS, Climb, climbs_from
+from graspatlas.analysis.objective import Objective
 from graspatlas.analysis.peaks import Peak, local_maxima, peaks_of
 from graspatlas.errors import GraspAtlasError
 from graspatlas.result.grasp_atlas import GraspAtlas
@@ -21,6 +22,8 @@ __all__ = ["refine"]
 
 #: Local maxima of the atlas from which to climb, the best first.
 MOST_STARTS = 40
+#: Climbs that the core makes between two looks at the clock.
+BATCH = 8
 
 
 @stoppable()
@@ -64,19 +67,22 @@ def refine(
     starts = np.asarray(charts)
     complete = True
     try:
-        for chart in charts:
-            left = _time_left(deadline)
-            ends.append(climb(result, int(chart), max_steps=max_steps, max_seconds=left))
-            bar.update()
+        inside = Objective.of(result, all_motions=False)
+        for batch in np.array_split(charts, -(-len(charts) // BATCH)):
+            X = result.atlas.centers[batch]
+            ends += climbs_from(inside, X, batch.tolist(), max_steps, _time_left(deadline))
+            bar.update(len(batch))
         if all_motions:
             # Climbs in R that met go on as one.
+            free = Objective.of(result, all_motions=True)
             tops = [_top(peak, ends) for peak in peaks_of(result, ends)]
             bar.total = len(charts) + len(tops)
             starts, ends = starts[tops], [ends[top] for top in tops]
-            for i, end in enumerate(ends):
-                left = _time_left(deadline)
-                ends[i] = climb(result, end.x, all_motions=True, max_steps=max_steps, max_seconds=left)
-                bar.update()
+            for first in range(0, len(ends), BATCH):
+                X = np.array([end.x for end in ends[first : first + BATCH]])
+                new = climbs_from(free, X, [-1] * len(X), max_steps, _time_left(deadline))
+                ends[first : first + BATCH] = new
+                bar.update(len(X))
     except KeyboardInterrupt:
         complete = False
         if not ends:
@@ -93,6 +99,7 @@ def refine(
         starts=np.array([starts[top] for top in tops], np.int64),
         converged=np.array([ends[top].converged for top in tops], bool),
         unbounded=np.array([ends[top].unbounded for top in tops], bool),
+        kkt=np.array([ends[top].kkt for top in tops]),
         steps=np.array([ends[top].n_steps for top in tops], np.int64),
         all_motions=all_motions,
         complete=complete,

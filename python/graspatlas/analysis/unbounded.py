@@ -9,14 +9,13 @@ every ring.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Protocol
-
 import numpy as np
 
+from graspatlas import _core
+from graspatlas.analysis.objective import Objective
 from graspatlas.support.arrays import Array
 
-__all__ = ["Model", "followed", "is_sharp", "levels_around", "never_levels_off", "rises_towards_one_point"]
+__all__ = ["followed", "is_sharp", "levels_around", "never_levels_off", "rises_towards_one_point"]
 
 
 #: Sizes of the rings, as shares of the chart radius.
@@ -30,46 +29,65 @@ LASTING = 0.5
 RUN_AWAY = 0.5
 #: A peak loses less than this share of its index on a ring as small as a climb's last steps.
 SHARP = 0.1
+#: What counts as better, relative to the index.
+LEAST_GAIN = 1e-7
 #: A sharp place is followed until steps are as small as this share of the chart radius, in at most so many of them.
 FINEST = 1e-7
 MOST_STEPS = 200
 
 
-class Model(Protocol):
-    """A grasp and the tangent space around it, in coordinates w [k] with |w| = 1 at the trust radius."""
+class Neighbourhood:
+    """The tangent space at a grasp, in coordinates w [k] with |w| = 1 at a radius, and the index of the points above it.
 
-    Phi: Array
+    Args:
+        objective: The index, and what grasps must meet.
+        x: The grasp [configuration_size].
+        value: The index there.
+        radius: Of the ring |w| = 1 [units of the tangent space].
+    """
 
-    def evaluate(self, W: Array) -> tuple[Array, Array]:
-        """Gains [n] over the grasp, as shares of its index, and slacks [n, c] of the points above W [n, k]."""
+    def __init__(self, objective: Objective, x: Array, value: float, radius: float) -> None:
+        self.objective, self.x, self.value, self.radius = objective, x, value, radius
+        J = objective.system.evaluate_jacobian(x)
+        self.Phi = np.ascontiguousarray(np.linalg.svd(J)[2][len(J) :])
 
-    def better(self, W: Array) -> tuple[Array, float] | None:
-        """The best of the points above W that meet everything, and its index, if that is larger."""
+    def points(self, W: Array) -> Array:
+        """Grasps above W [n, k] that meet bounds and requirements, eqs (14) and (15) [m, configuration_size]."""
+        above = [_core.project(self.objective.system, self.x, self.Phi, self.radius * w) for w in W]
+        X = np.array([x for x in above if x is not None]).reshape(-1, len(self.x))
+        return X[self.objective.meets(X)]
+
+    def gains(self, X: Array) -> Array:
+        """By how much the index of grasps is larger, as a share of that of the grasp [n]."""
+        return (self.objective.values(X) - self.value) / max(abs(self.value), 1e-12)
+
+    def best(self, W: Array) -> tuple[Array, float] | None:
+        """The best of the grasps above W and its index, if that is larger."""
+        X = self.points(W)
+        gains = self.gains(X)
+        if not len(X) or gains.max() < LEAST_GAIN:
+            return None
+        top = int(gains.argmax())
+        return X[top], self.value + float(gains[top]) * max(abs(self.value), 1e-12)
 
 
-#: The surroundings of a grasp with this index, up to this trust radius.
-ModelOf = Callable[[Array, float, float], Model]
-
-
-def levels_around(model_of: ModelOf, x: Array, value: float, radius: float) -> Array:
+def levels_around(objective: Objective, x: Array, value: float) -> Array:
     """Median of the index on each ring around a grasp, less the index there, as a share of it; NaN without grasps.
 
     Args:
-        model_of: The surroundings of a grasp.
+        objective: The index, and what grasps must meet.
         x: The grasp [configuration_size].
         value: The index there.
-        radius: Chart radius, of which the rings are shares.
 
     Returns:
         One value a ring, the largest ring first [5]; negative where the index is below that of the grasp.
     """
     levels = np.full(len(RINGS), np.nan)
     for i, share in enumerate(RINGS):
-        model = model_of(x, value, share * radius)
-        gains, slacks = model.evaluate(_ring(RING_POINTS, len(model.Phi), seed=0))
-        there = (gains > -1.0) & (slacks >= 0.0).all(axis=1)
-        if there.sum() >= FEWEST:
-            levels[i] = np.median(gains[there])
+        near = Neighbourhood(objective, x, value, share * objective.radius)
+        gains = near.gains(near.points(_ring(RING_POINTS, len(near.Phi), seed=0)))
+        if len(gains) >= FEWEST:
+            levels[i] = np.median(gains)
     return levels
 
 
@@ -93,25 +111,24 @@ def _lasts(levels: Array) -> bool:
     return bool(levels[0] < -RUN_AWAY and gains[0] > 0.0 and (gains[1:] >= LASTING * gains[:-1]).all())
 
 
-def followed(model_of: ModelOf, x: Array, value: float, radius: float) -> tuple[Array, float]:
+def followed(objective: Objective, x: Array, value: float) -> tuple[Array, float]:
     """Where ever smaller steps lead from a sharp place, and the index there: the best of a ring, or a smaller ring.
 
     Args:
-        model_of: The surroundings of a grasp.
+        objective: The index, and what grasps must meet; the first ring has a hundredth of its radius.
         x: Where to start [configuration_size].
         value: The index there.
-        radius: Chart radius; the first ring has a hundredth of it.
     """
-    trust_radius = RINGS[1] * radius
+    radius = RINGS[1] * objective.radius
     for step in range(MOST_STEPS):
-        model = model_of(x, value, trust_radius)
-        found = model.better(_ring(8 * len(model.Phi), len(model.Phi), seed=step))
+        near = Neighbourhood(objective, x, value, radius)
+        found = near.best(_ring(8 * len(near.Phi), len(near.Phi), seed=step))
         if found is not None:
             x, value = found
-        elif trust_radius <= FINEST * radius:
+        elif radius <= FINEST * objective.radius:
             break
         else:
-            trust_radius *= 0.5
+            radius *= 0.5
     return x, value
 
 

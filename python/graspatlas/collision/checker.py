@@ -71,6 +71,7 @@ class CollisionChecker:
     Attributes:
         pairs: Names of the shapes of each pair that is looked at (p,).
         required: Distance that each pair must keep, less what it may sink in (p,), metres.
+        batch: The compiled checker.
         thinned: How far the hulls that were thinned reach beyond what is left of them, by the shapes' names [m].
 
     Raises:
@@ -87,7 +88,7 @@ class CollisionChecker:
         self.required: Array = np.array([pair.required for pair in pairs])
         self.thinned = {shape.name: shape.error for shape in shapes if shape.error > 0.0}
         numbers = np.array([(pair.first, pair.second) for pair in pairs], np.int32).reshape(-1, 2)
-        self._core = _core.CollisionBatch(model, [shape.as_tuple() for shape in shapes], numbers, self.required)
+        self.batch = _core.CollisionBatch(model, [shape.as_tuple() for shape in shapes], numbers, self.required)
 
     def first_collision(self, x: ArrayLike) -> tuple[str, str] | None:
         """Names of the first two shapes found in collision at a grasp, or None.
@@ -95,7 +96,7 @@ class CollisionChecker:
         Args:
             x: The grasp (configuration_size,).
         """
-        (hit,) = self._core.first_hits(self._rows(np.asarray(x, float)[None]))
+        (hit,) = self.batch.first_hits(self._rows(np.asarray(x, float)[None]))
         return None if hit < 0 else self.pairs[hit]
 
     def free(self, X: ArrayLike) -> BoolArray:
@@ -109,7 +110,7 @@ class CollisionChecker:
         with progress_bar("collisions", "grasps", len(rows)) as bar:
             for start in range(0, len(rows), BATCH):
                 batch = rows[start : start + BATCH]
-                out[start : start + BATCH] = self._core.free(batch)
+                out[start : start + BATCH] = self.batch.free(batch)
                 bar.update(len(batch))
         return out
 
@@ -121,7 +122,7 @@ class CollisionChecker:
             pairs: Numbers of the pairs (p,), in the order of the attribute `pairs`; all by default.
         """
         chosen = self._chosen(pairs)
-        return np.asarray(self._core.nearest(self._rows(X), chosen)["distances"] - self.required[chosen])
+        return np.asarray(self.batch.nearest(self._rows(X), chosen)["distances"] - self.required[chosen])
 
     def nearest(self, X: ArrayLike, pairs: ArrayLike | None = None) -> Nearest:
         """Signed distance, nearest points and normal of pairs of shapes.
@@ -133,7 +134,7 @@ class CollisionChecker:
             pairs: Numbers of the pairs (p,), in the order of the attribute `pairs`; all by default.
         """
         chosen = self._chosen(pairs)
-        found = self._core.nearest(self._rows(X), chosen)
+        found = self.batch.nearest(self._rows(X), chosen)
         return Nearest(tuple(self.pairs[i] for i in chosen), **found)
 
     def depths(self, x: ArrayLike, frame: str | None, points: ArrayLike) -> Array:
@@ -155,7 +156,7 @@ class CollisionChecker:
             if (_in_object(shape) if joint is None else not _in_object(shape) and shape.joint == joint)
         ]
         rows, at = self._rows(np.asarray(x, float)[None]), np.atleast_2d(np.asarray(points, float))
-        return np.asarray(self._core.point_distances(rows, np.array(chosen, np.int32), at)[0])
+        return np.asarray(self.batch.point_distances(rows, np.array(chosen, np.int32), at)[0])
 
     def _rows(self, X: ArrayLike) -> Array:
         """The configurations in grasps, one a row."""

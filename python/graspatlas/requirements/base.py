@@ -7,21 +7,23 @@ Neither can write to the arrays that it gets.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.callables import called_flags
 from graspatlas.grasps.grasp import Grasp
 from graspatlas.grasps.grasps import Grasps
+from graspatlas.problem.problem import Problem
 from graspatlas.problem.requirement import StatedRequirement
 from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.support.validation import shown
 
-__all__ = ["Requirement", "RequirementLike", "Slacks", "asked", "requirement_name"]
+__all__ = ["Requirement", "RequirementLike", "Slacks", "asked", "requirement_measures", "requirement_name"]
 
 Slacks = Callable[[Grasps], Array]
 
@@ -52,6 +54,28 @@ class Requirement(StatedRequirement):
         return None
 
 
+    def measures(self, problem: Problem, system: _core.GraspSystem) -> list[_core.Measure]:
+        """What a climb in the compiled core follows: the slacks, and whether the requirement is met.
+
+        Args:
+            problem: The problem.
+            system: Its system, of the grasps that are climbed on.
+        """
+
+        def near(x: Array) -> Callable[[Array], Array]:
+            slacks = self.slacks_near(Grasps(problem, x, system))
+            if slacks is None:
+                return lambda X: np.empty((len(X), 0))
+            return lambda X: slacks(Grasps(problem, X, system))
+
+        return [_core.slacks_measure(near), *tested(self, problem, system)]
+
+
+def tested(requirement: RequirementLike, problem: Problem, system: _core.GraspSystem) -> list[_core.Measure]:
+    """What a climb may know of a requirement that has no slacks: where it is met."""
+    return [_core.test_measure(lambda X: asked(requirement, Grasps(problem, X, system)))]
+
+
 #: What may be required of grasps: a named requirement, or a function of a grasp; see the top of this module.
 RequirementLike = StatedRequirement | Callable[[Grasp], bool | np.bool_] | Callable[[Grasps], ArrayLike]
 
@@ -75,3 +99,20 @@ def asked(requirement: RequirementLike, grasps: Grasps) -> BoolArray:
     if isinstance(requirement, StatedRequirement):
         raise GraspAtlasError(f"requirement {shown(str(requirement))} cannot be checked; derive it from Requirement")
     return called_flags(requirement, requirement_name(requirement), grasps)
+
+
+def requirement_measures(
+    requirements: Sequence[RequirementLike], problem: Problem, system: _core.GraspSystem
+) -> list[_core.Measure]:
+    """What climbs in the compiled core follow to meet requirements.
+
+    Args:
+        requirements: The requirements.
+        problem: The problem.
+        system: Its system, of the grasps that are climbed on.
+    """
+    measures: list[_core.Measure] = []
+    for requirement in requirements:
+        named = isinstance(requirement, Requirement)
+        measures += requirement.measures(problem, system) if named else tested(requirement, problem, system)
+    return measures

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from graspatlas import _core
 from graspatlas.collision.checker import CollisionChecker, collision_checker
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.problem.problem import Problem
@@ -41,6 +42,10 @@ class CollisionFree(Requirement):
     def met(self, grasps: Grasps) -> BoolArray:
         """Whether each grasp meets the requirement (n,)."""
         return self._checker(grasps.problem).free(grasps.x)
+
+    def measures(self, problem: Problem, system: _core.GraspSystem) -> list[_core.Measure]:
+        """Distances of hand and object; see :meth:`Requirement.measures`."""
+        return [_core.distances_measure(self._checker(problem).batch)]
 
     def slacks_near(self, grasp: Grasps) -> Slacks:
         """Distances of the nearest pairs of shapes, less those asked for, in units of the problem's length scale."""

@@ -11,6 +11,7 @@ import numpy as np
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasps
+from graspatlas.problem.problem import Problem
 from graspatlas.requirements.base import Requirement, Slacks
 from graspatlas.support.arrays import Array, BoolArray
 
@@ -47,6 +48,10 @@ class ForceClosure(Requirement):
         """Whether each grasp meets the requirement (n,)."""
         margins = np.asarray(_core.force_closure_margins(grasps.system, grasps.x, self.friction, self.torsional))
         return np.asarray((margins > 0.0) & (margins >= self.margin))
+
+    def measures(self, problem: Problem, system: _core.GraspSystem) -> list[_core.Measure]:
+        """The margin with its sign; see :meth:`Requirement.measures`."""
+        return [_core.closure_measure(self.friction, self.torsional, self.margin)]
 
     def slacks_near(self, grasp: Grasps) -> Slacks:
         """The force-closure margin, negative where internal forces leave the cones, less the margin asked for."""

@@ -7,7 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from graspatlas import _core
 from graspatlas.grasps.grasps import Grasps
+from graspatlas.problem.problem import Problem
 from graspatlas.requirements.base import Requirement, Slacks
 from graspatlas.support.arrays import Array, BoolArray
 
@@ -33,6 +35,10 @@ class JointMargin(Requirement):
         """Whether each grasp meets the requirement (n,)."""
         lower, upper = grasps.problem.hand.joint_limits
         return np.asarray(((grasps.q - lower >= self.distance) & (upper - grasps.q >= self.distance)).all(axis=1))
+
+    def measures(self, problem: Problem, system: _core.GraspSystem) -> list[_core.Measure]:
+        """Distances of the joints from their limits; see :meth:`Requirement.measures`."""
+        return [_core.joint_margin_measure(self.distance)]
 
     def slacks_near(self, grasp: Grasps) -> Slacks:
         """Distance of each limited joint from its limits, less the distance asked for [rad or m]."""

@@ -34,6 +34,8 @@ class Refinement:
         converged: True where the climb ended at a maximum by itself; for the others see ``statuses`` [p].
         unbounded: True where the index has no maximum but grows without bound, as far as numbers can tell [p].
         steps: Steps of the climb to each [p].
+        kkt: Largest residual of the conditions of Karush, Kuhn and Tucker there, of the logarithm of the index [p]; at
+            most 1e-6 where ``converged``.
         all_motions: True when no hand motion was frozen but the couplings: the grasps lie in F, not only in R.
         complete: False when interrupted or cut short, so that basins may be missing, or climbs in F.
     """
@@ -44,6 +46,7 @@ class Refinement:
     converged: BoolArray
     unbounded: BoolArray
     steps: IntArray
+    kkt: Array
     all_motions: bool
     complete: bool
 
