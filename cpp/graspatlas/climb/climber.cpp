@@ -25,6 +25,7 @@ constexpr double kShortest = 1e-9;          // trust radius at which a climb has
 constexpr double kShort = 1e-4;             // trust radius below which refused steps are seen as kinks
 constexpr double kCutReach = 20.0;          // cuts farther away than so many trust radii are dropped
 constexpr double kKinkSize = 1e-5;          // at most so far from a kink its slopes are taken when a climb converges
+constexpr double kKinkStep = 1e-7;          // of differences near a kink, so that they do not reach across it
 constexpr std::size_t kMostCuts = 60;
 constexpr int kChallenges = 3;              // times that a maximum may prove to be none
 constexpr double kChallengeGain = 1e-8;     // of the index, relative, that shows it
@@ -80,6 +81,7 @@ bool Climber::begin(const double* x) {
   penalty_ = kFirstPenalty;
   kkt_ = HUGE_VAL;
   cuts_.clear();
+  here_.set_step(Surroundings::kStep);
   values_.clear();
   evaluations_ = challenges_ = 0;
   status_ = ClimbStatus::stalled;
@@ -203,7 +205,7 @@ Climber::Outcome Climber::step() {
 // The programme of the current grasp, with a penalty large enough that its step repairs what is missed; and the residual.
 bool Climber::solve() {
   for (int tries = 0;; ++tries) {
-    if (!program_.solve(B_, g_, rows_, cuts_, trust_radius_, penalty_)) {
+    if (!program_.solve(B_, g_, rows_, cuts_, trust_radius_, current_.missed > kMet ? penalty_ : 0.0)) {
       if (tries > 0 || (!has_curvature_ && cuts_.empty())) return false;
       B_ = Matrix::Identity(k_, k_);
       has_curvature_ = false;
@@ -320,6 +322,7 @@ void Climber::refuse() {
     if (cuts_.empty()) {
       B_ = Matrix::Identity(k_, k_);
       has_curvature_ = false;
+      here_.set_step(kKinkStep);
     }
     const auto before = cuts_.size();
     add_cuts(w_);

@@ -6,7 +6,7 @@ namespace graspatlas {
 
 void NumberMeasure::linearize(const Surroundings& at, double, Rows& rows) {
   double* slopes = rows.add(0, value(at.x()));
-  for (int i = 0; i < at.dimension(); ++i) slopes[i] = Surroundings::slope(value(at.ahead(i)), value(at.behind(i)));
+  for (int i = 0; i < at.dimension(); ++i) slopes[i] = at.slope(value(at.ahead(i)), value(at.behind(i)));
 }
 
 bool NumberMeasure::revisit(const double* x, double* values) {
@@ -45,7 +45,7 @@ void BatchMeasure::linearize(const Surroundings& at, double, Rows& rows) {
   const RowMatrix values = values_(X_);
   for (int c = 0; c < values.cols(); ++c) {
     double* slopes = rows.add(c, values(2 * k, c));
-    for (int i = 0; i < k; ++i) slopes[i] = Surroundings::slope(values(2 * i, c), values(2 * i + 1, c));
+    for (int i = 0; i < k; ++i) slopes[i] = at.slope(values(2 * i, c), values(2 * i + 1, c));
   }
 }
 

@@ -57,7 +57,7 @@ void JointMarginMeasure::linearize(const Surroundings& at, double, Rows& rows) {
   for (std::size_t l = 0; l < limits_.size(); ++l) {
     double* slopes = rows.add(static_cast<int>(l), slack(limits_[l], at.x()));
     for (int i = 0; i < at.dimension(); ++i)
-      slopes[i] = Surroundings::slope(slack(limits_[l], at.ahead(i)), slack(limits_[l], at.behind(i)));
+      slopes[i] = at.slope(slack(limits_[l], at.ahead(i)), slack(limits_[l], at.behind(i)));
   }
 }
 
@@ -83,7 +83,7 @@ void ClosureMeasure::linearize(const Surroundings& at, double, Rows& rows) {
   closure_.keep_multipliers();
   const double factor = slack >= kFarOpen ? 1.0 : -1.0 / slack;
   for (int i = 0; i < at.dimension(); ++i)
-    slopes[i] = factor * Surroundings::slope(closure_.lagrangian(at.ahead(i)), closure_.lagrangian(at.behind(i)));
+    slopes[i] = factor * at.slope(closure_.lagrangian(at.ahead(i)), closure_.lagrangian(at.behind(i)));
 }
 
 bool ClosureMeasure::revisit(const double* x, double* values) {
@@ -133,7 +133,7 @@ void DistancesMeasure::linearize(const Surroundings& at, double reach, Rows& row
     for (std::size_t w = 0; w < watched_.size(); ++w) {
       const double distance = along_normal(watched_[w]) / length_scale_;
       double& slope = rows.slopes(first_row + static_cast<int>(w))[i];
-      slope = sign > 0.0 ? distance : Surroundings::slope(slope, distance);
+      slope = sign > 0.0 ? distance : at.slope(slope, distance);
     }
   };
   if (watched_.empty()) return;

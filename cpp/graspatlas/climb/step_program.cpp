@@ -9,6 +9,7 @@ namespace {
 
 // Curvatures that make the programme strictly convex in t, beside the penalty, and in v.
 constexpr double kMissedCurvature = 1e-2, kGainCurvature = 1e-4;
+constexpr double kLeastCurvature = 1e-7;  // beside the others, which keeps rounding small
 constexpr int kMostIterations = 500;
 
 }  // namespace
@@ -18,7 +19,8 @@ StepProgram::StepProgram(int dimension) : k_(dimension), no_rows_(0, 0) { solver
 bool StepProgram::solve(const Matrix& B, const Vector& g, const Rows& slacks, const std::vector<Cut>& cuts,
                         double trust_radius, double penalty) {
   const bool cut_index = std::any_of(cuts.begin(), cuts.end(), [](const Cut& cut) { return cut.of_index; });
-  const int n = k_ + 1 + cut_index, t = k_, v = k_ + 1;
+  const bool may_miss = penalty > 0.0;
+  const int v = k_, t = k_ + cut_index, n = t + may_miss;
   const int most = slacks.size() + static_cast<int>(cuts.size()) + 2 + 2 * k_;
   rows_.setZero(most, n);
   right_.setZero(most);
@@ -29,13 +31,16 @@ bool StepProgram::solve(const Matrix& B, const Vector& g, const Rows& slacks, co
     const auto slopes = slopes_of(row);
     if (slacks.value(row) > trust_radius * slopes.lpNorm<1>()) continue;  // out of the step's reach
     rows_.row(count).head(k_) = slopes.transpose();
-    rows_(count, t) = 1.0;
-    right_(count++) = slacks.value(row);
+    if (may_miss) rows_(count, t) = 1.0;
+    right_(count++) = may_miss ? slacks.value(row) : std::max(slacks.value(row), 0.0);
     source_.push_back(row);
   }
   for (std::size_t c = 0; c < cuts.size(); ++c) {
     rows_.row(count).head(k_) = cuts[c].slopes.transpose();
-    rows_(count, cuts[c].of_index ? v : t) = cuts[c].of_index ? -1.0 : 1.0;
+    if (cuts[c].of_index)
+      rows_(count, v) = -1.0;
+    else if (may_miss)
+      rows_(count, t) = 1.0;
     right_(count++) = cuts[c].value;
     source_.push_back(-1 - static_cast<int>(c));
   }
@@ -44,7 +49,7 @@ bool StepProgram::solve(const Matrix& B, const Vector& g, const Rows& slacks, co
     rows_.row(count).head(k_) = g.transpose();
     rows_(count++, v) = -1.0;
   }
-  rows_(count++, t) = 1.0;
+  if (may_miss) rows_(count++, t) = 1.0;
   for (int i = 0; i < k_; ++i)
     for (const double sign : {1.0, -1.0}) {
       rows_(count, i) = sign;
@@ -55,9 +60,12 @@ bool StepProgram::solve(const Matrix& B, const Vector& g, const Rows& slacks, co
 
   hessian_.setZero(n, n);
   hessian_.topLeftCorner(k_, k_) = B;
-  hessian_(t, t) = kMissedCurvature * penalty;
+  hessian_.diagonal().head(k_).array() += kLeastCurvature * B.trace();
   linear_.setZero(n);
-  linear_(t) = penalty;
+  if (may_miss) {
+    hessian_(t, t) = kMissedCurvature * penalty;
+    linear_(t) = penalty;
+  }
   if (cut_index) {
     hessian_(v, v) = kGainCurvature;
     linear_(v) = -1.0;
@@ -71,7 +79,7 @@ bool StepProgram::solve(const Matrix& B, const Vector& g, const Rows& slacks, co
   if (status != eiquadprog::solvers::EIQUADPROG_FAST_OPTIMAL || !solution_.allFinite()) return false;
 
   w_ = solution_.head(k_).cwiseMax(-trust_radius).cwiseMin(trust_radius);
-  missed_ = std::max(solution_(t), 0.0);
+  missed_ = may_miss ? std::max(solution_(t), 0.0) : 0.0;
   lambda_.setZero(slacks.size());
   left_over_ = cut_index ? Vector::Zero(k_).eval() : g;
   const auto active = static_cast<Eigen::Index>(solver_.getActiveSetSize());

@@ -22,12 +22,12 @@ struct Cut {
 ///   so that   v <= g . w, and the index's cuts,   c_i + a_i . w + t >= 0,   t >= 0,   |w|_inf <= trust radius
 ///
 /// with the slope g of the index, and the slacks c_i and their slopes a_i. What requirements miss is t, so a step towards
-/// them is found where they cannot be met at once.
+/// them is found where they cannot be met at once. Where the current grasp meets them t is left out.
 class StepProgram {
  public:
   explicit StepProgram(int dimension);
 
-  /// B [k x k] positive definite, g [k], rows of slacks, cuts. False when rounding defeats the solver.
+  /// B [k x k] positive definite, g [k], rows of slacks, cuts; a penalty of 0 leaves t out. False when rounding defeats the solver.
   bool solve(const Matrix& B, const Vector& g, const Rows& slacks, const std::vector<Cut>& cuts, double trust_radius,
              double penalty);
 

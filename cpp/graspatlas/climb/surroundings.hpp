@@ -22,13 +22,15 @@ class Surroundings {
   const double* behind(int i) const { return behind_.row(i).data(); }
 
   /// The slope along a tangent vector of a number with these values ahead and behind.
-  static double slope(double ahead, double behind) { return (ahead - behind) / (2.0 * kStep); }
+  double slope(double ahead, double behind) const { return (ahead - behind) / (2.0 * h_); }
 
-  static constexpr double kStep = 1e-5;  ///< h [units of the tangent space]
+  void set_step(double h) { h_ = h; }
+  static constexpr double kStep = 1e-5;  ///< h, unless another is set [units of the tangent space]
 
  private:
   const System& system_;
   int k_;
+  double h_ = kStep;
   std::vector<double> x_, step_;
   RowMatrix Phi_, ahead_, behind_;
 };
