@@ -24,6 +24,7 @@ constexpr double kGrowth = 2.5, kMostGrowth = 4.0;   // of the trust radius
 constexpr double kShortest = 1e-9;          // trust radius at which a climb has stalled [units of the tangent space]
 constexpr double kShort = 1e-4;             // trust radius below which refused steps are seen as kinks
 constexpr double kCutReach = 20.0;          // cuts farther away than so many trust radii are dropped
+constexpr double kSameSlope = 1e-3;         // relative difference of slopes up to which there is no kink between
 constexpr double kKinkSize = 1e-5;          // at most so far from a kink its slopes are taken when a climb converges
 constexpr double kKinkStep = 1e-7;          // of differences near a kink, so that they do not reach across it
 constexpr std::size_t kMostCuts = 60;
@@ -95,7 +96,7 @@ bool Climber::begin(const double* x) {
   trial_.slacks.resize(static_cast<std::size_t>(rows_.size()));
   look_at_trial();
   std::swap(trial_, current_);
-  if (!(current_.missed > kMet) && !current_.blocked) start_climbing();
+  if (!(current_.missed > 0.0) && !current_.blocked) start_climbing();
   return true;
 }
 
@@ -115,7 +116,7 @@ void Climber::linearize(const std::vector<double>& x, const std::vector<double>&
 void Climber::linearize_current() {
   linearize(current_.x, Phi_, !repairing_);
   current_.missed = 0.0;
-  for (int row = 0; row < rows_.size(); ++row) current_.missed = std::max(current_.missed, -rows_.value(row));
+  for (int row = 0; row < rows_.size(); ++row) current_.missed = std::max(current_.missed, -rows_.value(row) - kMet);
   set_slope();
 }
 
@@ -167,12 +168,12 @@ Climber::Outcome Climber::step() {
   if (!solve()) return end_step(repairing_ ? ClimbStatus::not_met : ClimbStatus::stalled);
   w_ = program_.w();
   const double size = w_.lpNorm<Eigen::Infinity>();
-  const double promised = program_.model_gain() + penalty_ * (current_.missed - program_.missed());
-  if (!repairing_ && kkt_ < kConverged && current_.missed <= kMet) {
+  const double promised = program_.model_gain() + penalty_ * (current_.missed - std::max(program_.missed() - kMet, 0.0));
+  if (!repairing_ && kkt_ < kConverged && current_.missed <= 0.0) {
     double farthest = 0.0;
     for (const Cut& cut : cuts_) farthest = std::max(farthest, cut.at.lpNorm<Eigen::Infinity>());
     if (farthest <= kKinkSize) return challenged() ? Outcome::taken : end_step(ClimbStatus::converged);
-    trust_radius_ = std::max(0.1 * farthest / kCutReach, 0.1 * kKinkSize);
+    trust_radius_ = std::max(0.1 * farthest / kCutReach, kShortest);
     shift_cuts(Vector::Zero(k_), 0.0);
     return Outcome::refused;
   }
@@ -205,7 +206,7 @@ Climber::Outcome Climber::step() {
 // The programme of the current grasp, with a penalty large enough that its step repairs what is missed; and the residual.
 bool Climber::solve() {
   for (int tries = 0;; ++tries) {
-    if (!program_.solve(B_, g_, rows_, cuts_, trust_radius_, current_.missed > kMet ? penalty_ : 0.0)) {
+    if (!program_.solve(B_, g_, rows_, cuts_, trust_radius_, current_.missed > 0.0 ? penalty_ : 0.0)) {
       if (tries > 0 || (!has_curvature_ && cuts_.empty())) return false;
       B_ = Matrix::Identity(k_, k_);
       has_curvature_ = false;
@@ -219,7 +220,7 @@ bool Climber::solve() {
   lambda_ = program_.multipliers();
   const double held = lambda_.sum();
   if (held > 0.5 * penalty_ && !repairing_) penalty_ = std::min(4.0 * held, kLargestPenalty);
-  kkt_ = std::max(program_.left_over().lpNorm<Eigen::Infinity>(), current_.missed > kMet ? current_.missed : 0.0);
+  kkt_ = std::max(program_.left_over().lpNorm<Eigen::Infinity>(), current_.missed);
   for (int row = 0; row < rows_.size(); ++row)
     kkt_ = std::max(kkt_, lambda_(row) * std::max(rows_.value(row), 0.0));
   return true;
@@ -249,7 +250,7 @@ void Climber::look_at_trial() {
     while (row < rows_.size() && rows_.id(row) / kIdsOfRequirement == static_cast<int>(r)) ++row;
   }
   trial_.missed = 0.0;
-  for (const double slack : trial_.slacks) trial_.missed = std::max(trial_.missed, -slack);
+  for (const double slack : trial_.slacks) trial_.missed = std::max(trial_.missed, -slack - kMet);
   if (!repairing_) index_.revisit(trial_.x.data(), &trial_.value);
   ++evaluations_;
 }
@@ -278,7 +279,7 @@ void Climber::take() {
   const Vector old_g = g_;
   linearize_current();
   if (repairing_) {
-    if (current_.missed <= kMet && !current_.blocked) start_climbing();
+    if (current_.missed <= 0.0 && !current_.blocked) start_climbing();
     return;
   }
   if (cuts_.empty()) {
@@ -334,7 +335,7 @@ void Climber::refuse() {
 void Climber::shift_cuts(const Vector& w, double gained) {
   for (Cut& cut : cuts_) {
     cut.value += cut.slopes.dot(w) - (cut.of_index ? gained : 0.0);
-    if (cut.of_index || current_.missed <= kMet) cut.value = std::max(cut.value, 0.0);
+    if (cut.of_index || current_.missed <= 0.0) cut.value = std::max(cut.value, 0.0);
     cut.at -= w;
   }
   const double farthest = kCutReach * trust_radius_;
@@ -349,14 +350,14 @@ void Climber::add_cuts(const Vector& w) {
   Rows kept = rows_;
   linearize(trial_.x, trial_Phi_, true);
   Vector slopes = Eigen::Map<const Vector>(index_row_.slopes(0), k_) / (logarithmic_ ? index_row_.value(0) : scale_);
-  if (slopes.allFinite() && std::isfinite(gained))
+  if (slopes.allFinite() && std::isfinite(gained) && (slopes - g_).norm() > kSameSlope * g_.norm())
     cuts_.push_back({true, std::max(gained - slopes.dot(w), 0.0), slopes, w});
   for (int row = 0; row < rows_.size(); ++row) {
     slopes = Eigen::Map<const Vector>(rows_.slopes(row), k_);
     const int here = kept.find(rows_.id(row));
     double value = rows_.value(row) - slopes.dot(w);
     value = std::max(value, here >= 0 ? std::min(kept.value(here), value + kShort) : 0.0);
-    if (here >= 0 && (slopes - Eigen::Map<const Vector>(kept.slopes(here), k_)).norm() < 1e-3 * slopes.norm()) continue;
+    if (here >= 0 && (slopes - Eigen::Map<const Vector>(kept.slopes(here), k_)).norm() < kSameSlope * slopes.norm()) continue;
     if (value < trust_radius_ * slopes.lpNorm<1>()) cuts_.push_back({false, value, slopes, w});
   }
   if (cuts_.size() > kMostCuts) cuts_.erase(cuts_.begin(), cuts_.end() - kMostCuts);
@@ -389,13 +390,13 @@ bool Climber::challenged() {
 }
 
 void Climber::keep_if_best() {
-  if (current_.blocked || current_.missed > kMet || (has_best_ && current_.value < best_.value)) return;
+  if (current_.blocked || current_.missed > 0.0 || (has_best_ && current_.value < best_.value)) return;
   best_ = current_;
   has_best_ = true;
 }
 
 ClimbEnd Climber::end() const {
-  const bool current_is_met = !repairing_ && !current_.blocked && current_.missed <= kMet;
+  const bool current_is_met = !repairing_ && !current_.blocked && current_.missed <= 0.0;
   const bool best_is_better = has_best_ && (!current_is_met || best_.value > current_.value + kSameEnd * std::abs(best_.value));
   const Point& point = best_is_better ? best_ : current_;
   ClimbEnd found{point.x, point.value, 0.0, kkt_, status_, values_, evaluations_};
