@@ -72,6 +72,7 @@ class Climber {
   enum class Outcome { taken, refused, ended };
 
   bool begin(const double* x);
+  bool gets_nowhere(int steps);
   void linearize(const std::vector<double>& x, const std::vector<double>& Phi, bool index);
   void linearize_current();
   void set_slope();
@@ -89,6 +90,7 @@ class Climber {
   void refuse();
   void shift_cuts(const Vector& w, double gained);
   void add_cuts(const Vector& w);
+  void sample_cuts();
   bool challenged();
   void keep_if_best();
   ClimbEnd end() const;
@@ -110,9 +112,10 @@ class Climber {
   Rows rows_, old_rows_, index_row_;
   Matrix B_;
   double trust_radius_ = 0.0, penalty_ = 0.0, kkt_ = 0.0, reach_ = 0.0;
+  double missed_before_ = 0.0, best_before_ = 0.0;
   std::vector<Cut> cuts_;
   std::vector<double> values_;
-  int evaluations_ = 0, challenges_ = 0;
+  int evaluations_ = 0, challenges_ = 0, samplings_ = 0;
   ClimbStatus status_ = ClimbStatus::given_up;
 };
 
