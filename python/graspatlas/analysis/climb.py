@@ -51,6 +51,7 @@ class Climb:
             :mod:`graspatlas.analysis.unbounded`.
         kkt: Largest residual of the conditions of Karush, Kuhn and Tucker where it ended, of the logarithm of the index
             [per unit of the tangent space].
+        stalled: True when it ended because no smaller step gained anything, though slopes do not vanish.
     """
 
     chart: int
@@ -59,6 +60,7 @@ class Climb:
     converged: bool
     unbounded: bool = False
     kkt: float = float("nan")
+    stalled: bool = False
 
     def __repr__(self) -> str:
         end = "converged" if self.converged else "given up"
@@ -152,7 +154,15 @@ def climbs_of(objective: Objective, X: Array, charts: Sequence[int], ends: Ends)
         if ends.status[i] != "not met" and objective.meets(ends.x[i : i + 1])[0]:
             qualities = np.concatenate([values[i : i + 1], ends.values[i][1:]])
             qualities[-1] = objective.values(ends.x[i : i + 1])[0]
-            end = Climb(int(chart), ends.x[i], qualities, ends.status[i] == "converged", kkt=float(ends.kkt[i]))
+            status = ends.status[i]
+            end = Climb(
+                int(chart),
+                ends.x[i],
+                qualities,
+                status == "converged",
+                kkt=float(ends.kkt[i]),
+                stalled=status == "stalled",
+            )
         found.append(_judged(objective, end))
     return found
 

@@ -170,7 +170,12 @@ class GraspAtlas(Light):
 
     @property
     def gain(self) -> float:
-        """By how much the refined best is better than the best chart, as a share of the latter's quality."""
+        """By how much the refined best is better than the best chart, as a share of the latter's quality.
+
+        Infinite where no chart meets the requirements.
+        """
+        if not self.accepted.any():
+            return float("inf")
         return (self.refined_best.quality - self.best.quality) / max(abs(self.best.quality), 1e-300)
 
     def values(self, quality: Quality) -> Array:

@@ -59,14 +59,43 @@ class OtherSummary(TypedDict):
     largest: NotRequired[float]
 
 
+class PeakSummary(TypedDict):
+    """A place at which climbs ended; kkt is None where it is not known."""
+
+    quality: float
+    status: str
+    hits: int
+    kkt: float | None
+
+
+class SearchSummary(TypedDict):
+    """What a search over all feasible grasps did; see :class:`graspatlas.SearchReport`."""
+
+    status: str
+    rounds: int
+    climbs: int
+    met: int
+    peaks: int
+    best_hits: int
+    share_missing: float
+    tries: int
+    seed: int
+    seconds: float
+
+
 class RefinementSummary(TypedDict):
-    """The best of the refined maxima; no gain where the index grows without bound."""
+    """The best of the refined maxima; no gain where the index grows without bound, or no chart is accepted."""
 
     quality: float
     gain: float | None
     status: str
     converged: bool
     steps: int
+    kkt: float | None
+    starts: int
+    share_missing: float | None
+    peaks: list[PeakSummary]
+    search: NotRequired[SearchSummary]
     n_peaks: int
     n_unbounded: int
     advice: str

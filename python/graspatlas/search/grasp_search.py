@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -130,7 +131,7 @@ class GraspSearch:
         GraspAtlasError: If the problem has no such dimension, or the reference leaves the hand no posture.
     """
 
-    def __init__(self, problem: Problem, dimension: int, seed: int) -> None:
+    def __init__(self, problem: Problem, dimension: int, seed: int | Sequence[int]) -> None:
         self.system = problem.system(dimension)
         # Where all feasible grasps are sought the reference is but the middle of the postures that are drawn.
         frozen = problem.frozen_motions(dimension) > 0
