@@ -14,6 +14,7 @@ from graspatlas.analysis.refine import refine
 from graspatlas.atlas.atlas import Atlas
 from graspatlas.atlas.build import build_atlas
 from graspatlas.atlas.status import Closed, Status
+from graspatlas.atlas.upper_bounds import estimate_upper_bounds
 from graspatlas.errors import GraspAtlasError
 from graspatlas.execution.approach import Approach
 from graspatlas.execution.contact_forces import ContactForces
@@ -39,6 +40,7 @@ from graspatlas.requirements.collision_free import CollisionFree
 from graspatlas.requirements.force_closure import ForceClosure
 from graspatlas.requirements.holding_force import HoldingForce
 from graspatlas.requirements.joint_margin import JointMargin
+from graspatlas.result.gap import Gap
 from graspatlas.result.refinement import Refinement
 from graspatlas.result.result import Result, load_result
 from graspatlas.search.grasp_search import find_grasps
@@ -76,6 +78,7 @@ __all__ = [
     "ContactForces",
     "FirstGrasp",
     "ForceClosure",
+    "Gap",
     "Grasp",
     "GraspAtlasError",
     "GraspPath",
@@ -102,6 +105,7 @@ __all__ = [
     "bundled_problems",
     "climb",
     "densify",
+    "estimate_upper_bounds",
     "export_grasps",
     "export_html",
     "find_components",
