@@ -27,7 +27,10 @@ from graspatlas.hand.body import Body
 from graspatlas.hand.hand import Hand
 from graspatlas.hand.motions import HandMotions
 from graspatlas.optimizer.components import Components, SearchStatus, find_components
+from graspatlas.optimizer.ladder import ladder
+from graspatlas.optimizer.ladder_outcome import Ladder
 from graspatlas.optimizer.optimize import optimize
+from graspatlas.optimizer.rungs import Rung
 from graspatlas.paths.path import GraspPath, Path
 from graspatlas.paths.shortest_path import shortest_path
 from graspatlas.problem.contacts import Contact
@@ -60,6 +63,7 @@ if typing.TYPE_CHECKING:
         plot_ellipsoid,
         plot_growth,
         plot_holding,
+        plot_ladder,
         plot_local_maxima,
         plot_pareto,
         plot_planar_grasp,
@@ -87,6 +91,7 @@ __all__ = [
     "HandMotions",
     "HoldingForce",
     "JointMargin",
+    "Ladder",
     "Path",
     "Peak",
     "PoseGuess",
@@ -95,6 +100,7 @@ __all__ = [
     "Recording",
     "Refinement",
     "Result",
+    "Rung",
     "Samples",
     "SearchStatus",
     "Simulation",
@@ -110,6 +116,7 @@ __all__ = [
     "export_html",
     "find_components",
     "find_grasps",
+    "ladder",
     "load_problem",
     "load_result",
     "load_simulation",
@@ -125,6 +132,7 @@ __all__ = [
     "plot_ellipsoid",
     "plot_growth",
     "plot_holding",
+    "plot_ladder",
     "plot_local_maxima",
     "plot_pareto",
     "plot_planar_grasp",
