@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from graspatlas.atlas.verification import CheckReport
 from graspatlas.grasps.columns import grasp_columns, parameter_columns
 from graspatlas.grasps.grasp import Grasp
@@ -16,7 +18,14 @@ from graspatlas.quality.batched import quality_name
 from graspatlas.result.exports import Choice, save_grasps
 from graspatlas.result.files import read_result, save_result
 from graspatlas.result.grasp_atlas import GraspAtlas
-from graspatlas.result.summary import GraspSummary, OtherSummary, PeakSummary, RefinementSummary, ResultSummary
+from graspatlas.result.summary import (
+    GapSummary,
+    GraspSummary,
+    OtherSummary,
+    PeakSummary,
+    RefinementSummary,
+    ResultSummary,
+)
 from graspatlas.result.verification import check_result
 from graspatlas.support.columns import joined, to_frame
 from graspatlas.support.renamed import renamed_keyword
@@ -130,6 +139,7 @@ class Result(GraspAtlas):
                 "at_x1": float(self.qualities[0]),
             },
             "best": _summary_of_grasp(best) if best else None,
+            "gap": self._summary_of_gap(),
         }
         if self.others:
             summary["others"] = self._summary_of_others(best)
@@ -146,6 +156,22 @@ class Result(GraspAtlas):
             if len(left):
                 out[name]["largest"] = float(left.max())
         return out
+
+    def _summary_of_gap(self) -> GapSummary | None:
+        """The gap; None where there is no best to compare with."""
+        runs_away = self.refinement is not None and bool(self.refinement.unbounded[0])
+        if runs_away or not self.accepted.any():
+            return None
+        gap = self.gap
+        return {
+            "kind": "estimated",
+            "n_charts": gap.n_charts,
+            "n_rejected": gap.n_rejected,
+            "n_unknown": len(gap.unknown),
+            "best": gap.best,
+            "bound": gap.bound,
+            "share": gap.share if np.isfinite(gap.share) else None,
+        }
 
     def _summary_of_refinement(self) -> RefinementSummary:
         best, refinement = self.refined_best, self.refinement

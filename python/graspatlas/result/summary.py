@@ -8,6 +8,7 @@ from typing_extensions import NotRequired
 
 __all__ = [
     "AuditSummary",
+    "GapSummary",
     "GraspSummary",
     "OtherSummary",
     "QualitySummary",
@@ -41,6 +42,18 @@ class QualitySummary(TypedDict):
     best: float | None
     worst: float | None
     at_x1: float
+
+
+class GapSummary(TypedDict):
+    """The charts that could hold a better grasp, estimated; no share of a best that is 0."""
+
+    kind: str
+    n_charts: int
+    n_rejected: int
+    n_unknown: int
+    best: float
+    bound: float
+    share: float | None
 
 
 class GraspSummary(TypedDict):
@@ -107,7 +120,10 @@ class RefinementSummary(TypedDict):
 
 
 class ResultSummary(TypedDict):
-    """A result in plain data; best is None where no grasp meets the requirements."""
+    """A result in plain data; best is None where no grasp meets the requirements, and then the gap is, too.
+
+    The gap is also None where the index grows without bound, so that there is no best.
+    """
 
     problem: str
     dimension: int
@@ -124,5 +140,6 @@ class ResultSummary(TypedDict):
     max_residual: float
     quality: QualitySummary
     best: GraspSummary | None
+    gap: GapSummary | None
     others: NotRequired[dict[str, OtherSummary]]
     refined: NotRequired[RefinementSummary]
