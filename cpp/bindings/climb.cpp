@@ -24,6 +24,7 @@ namespace graspatlas {
 
 namespace {
 
+using EndTable = py::typing::Dict<py::str, py::object>;
 using PythonFunction = py::typing::Callable<py::array(py::array)>;
 /// Of one grasp [1 x configuration_size]: a function of grasps near it that returns rows of numbers.
 using NearFunction = py::typing::Callable<PythonFunction(py::array)>;
@@ -128,7 +129,7 @@ MeasureRecipe test_recipe(const PythonFunction& met) {
 }
 
 /// The ends of the climbs as arrays, one row or number each; `values` is a list of arrays.
-py::dict table_of(const std::vector<ClimbEnd>& ends, int size) {
+EndTable table_of(const std::vector<ClimbEnd>& ends, int size) {
   const auto n = static_cast<py::ssize_t>(ends.size());
   py::array_t<double> x = matrix<double>(n, size), value(n), missed(n), kkt(n);
   py::array_t<int> evaluations(n);
@@ -143,7 +144,7 @@ py::dict table_of(const std::vector<ClimbEnd>& ends, int size) {
     statuses.append(name_of(end.status));
     values.append(py::array_t<double>(static_cast<py::ssize_t>(end.values.size()), end.values.data()));
   }
-  py::dict table;
+  EndTable table;
   table["x"] = x;
   table["value"] = value;
   table["missed"] = missed;
@@ -182,7 +183,7 @@ void until(std::optional<double> max_seconds, const Work& work) {
   if (interrupted) throw py::error_already_set();
 }
 
-py::dict climbs(GraspSystem& system, const DoubleArray& X, const MeasureRecipe& index,
+EndTable climbs(GraspSystem& system, const DoubleArray& X, const MeasureRecipe& index,
                 const std::vector<MeasureRecipe>& requirements, double trust_radius, int max_steps,
                 std::optional<double> max_seconds, std::optional<int> threads) {
   check_rows(system, X);
@@ -221,17 +222,19 @@ void bind_climb(py::module_& module) {
   module.def("distances_measure", &distances_recipe, py::arg("batch"), "Distances of hand and object.");
   module.def("numbers_measure", &numbers_recipe, py::arg("values"),
              "An index that is a function of grasps [n x configuration_size] that returns numbers [n].");
-  module.def("slacks_measure", &slacks_recipe, py::arg("near"),
-             "A requirement's slacks: a function of one grasp [1 x configuration_size] that returns a function of grasps "
-             "near it [n x configuration_size], which returns slacks [n x c].");
+  module.def(
+      "slacks_measure", &slacks_recipe, py::arg("near"),
+      "A requirement's slacks: a function of one grasp [1 x configuration_size] that returns a function of grasps "
+      "near it [n x configuration_size], which returns slacks [n x c].");
   module.def("test_measure", &test_recipe, py::arg("met"),
              "A requirement that is a function of grasps [n x configuration_size] that returns flags [n].");
-  module.def("climbs", &climbs, py::arg("system"), py::arg("X"), py::arg("index"), py::arg("requirements"),
-             py::arg("trust_radius"), py::arg("max_steps"), py::arg("max_seconds") = py::none(),
-             py::arg("threads") = py::none(),
-             "Climbs from each grasp of X [n x configuration_size] to a local maximum of the index within bounds and "
-             "requirements: ends x [n x configuration_size], value, missed, kkt and evaluations [n], and lists of status "
-             "and of values. See climb/climber.hpp.");
+  module.def(
+      "climbs", &climbs, py::arg("system"), py::arg("X"), py::arg("index"), py::arg("requirements"),
+      py::arg("trust_radius"), py::arg("max_steps"), py::arg("max_seconds") = py::none(),
+      py::arg("threads") = py::none(),
+      "Climbs from each grasp of X [n x configuration_size] to a local maximum of the index within bounds and "
+      "requirements: ends x [n x configuration_size], value, missed, kkt and evaluations [n], and lists of status "
+      "and of values. See climb/climber.hpp.");
   module.def("missed", &missed, py::arg("system"), py::arg("X"), py::arg("requirements"),
              "By how much each grasp of X misses the requirement that it misses most, in about units of the tangent "
              "space [n]; infinite where a requirement that is met or not is not met.");

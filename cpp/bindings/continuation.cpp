@@ -284,7 +284,7 @@ void bind_parts(py::module_& module) {
 }
 
 /// Rows that did not get there are left where the method ended.
-py::tuple project_far(System& system, const DoubleArray& X) {
+py::typing::Tuple<py::array_t<double>, py::array_t<bool>> project_far(System& system, const DoubleArray& X) {
   const py::ssize_t n = X.ndim() == 2 ? X.shape(0) : 0, size = system.configuration_size();
   if (X.ndim() != 2 || X.shape(1) != size)
     throw Error("X must have " + std::to_string(size) + " columns, one row for each point");
@@ -334,9 +334,10 @@ void bind_continuation(py::module_& module) {
       py::arg("system"), py::arg("x"), py::arg("Phi"), py::arg("u"),
       "Point of the manifold above u in the tangent space at x (eqs 14 and 15); None when Newton does not "
       "converge.");
-  module.def("project_far", &project_far, py::arg("system"), py::arg("X"),
-             "Points X [n x configuration_size], which may be far off, moved to the manifold and within the bounds; and "
-             "whether each got there [n]. See manifold/far_projection.hpp.");
+  module.def(
+      "project_far", &project_far, py::arg("system"), py::arg("X"),
+      "Points X [n x configuration_size], which may be far off, moved to the manifold and within the bounds; and "
+      "whether each got there [n]. See manifold/far_projection.hpp.");
 }
 
 }  // namespace graspatlas

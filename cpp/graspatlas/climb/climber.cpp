@@ -13,32 +13,32 @@ namespace {
 constexpr int kIdsOfRequirement = 1 << 20;  // more than any requirement has rows
 // Of the penalty: where it starts, and the most that it becomes. [relative gain of the index for a unit missed]
 constexpr double kFirstPenalty = 10.0, kLargestPenalty = 1e8;
-constexpr double kLeastProgress = 0.1;      // share of what is missed that a step must promise to repair
+constexpr double kLeastProgress = 0.1;  // share of what is missed that a step must promise to repair
 // A repair goes on while each so many steps leave less than this share of what was missed before.
 constexpr int kRepairSteps = 10;
 constexpr double kRepairShare = 0.8;
 // A climb ends where each so many steps, all of them tiny, gain less than this.
 constexpr int kTinySteps = 25;
 constexpr double kTinyGain = 1e-9;
-constexpr double kAccepted = 1e-4;          // share of the promised gain that a step must give
-constexpr double kRounding = 1e-11;         // of gains
-constexpr double kRoundingOfSlacks = 2e-9;  // distances are known to 1e-10 m
-constexpr double kMet = 0.5e-8;             // a slack may miss the inside of a requirement by so much
-constexpr double kSteered = 1e-7;           // what is missed by less does not make the penalty larger
-constexpr double kHardlyMissed = 1e-9;      // what is not made good by the next step
-constexpr double kGrowth = 2.5, kMostGrowth = 4.0;   // of the trust radius
-constexpr double kShortest = 1e-9;          // trust radius at which a climb has stalled [units of the tangent space]
-constexpr double kShort = 1e-4;             // trust radius below which refused steps are seen as kinks
-constexpr double kCutReach = 20.0;          // cuts farther away than so many trust radii are dropped
-constexpr double kSameSlope = 1e-3;         // relative difference of slopes up to which there is no kink between
-constexpr double kKinkSize = 1e-5;          // at most so far from a kink its slopes are taken when a climb converges
-constexpr double kKinkStep = 1e-7;          // of differences near a kink, so that they do not reach across it
+constexpr double kAccepted = 1e-4;                  // share of the promised gain that a step must give
+constexpr double kRounding = 1e-11;                 // of gains
+constexpr double kRoundingOfSlacks = 2e-9;          // distances are known to 1e-10 m
+constexpr double kMet = 0.5e-8;                     // a slack may miss the inside of a requirement by so much
+constexpr double kSteered = 1e-7;                   // what is missed by less does not make the penalty larger
+constexpr double kHardlyMissed = 1e-9;              // what is not made good by the next step
+constexpr double kGrowth = 2.5, kMostGrowth = 4.0;  // of the trust radius
+constexpr double kShortest = 1e-9;   // trust radius at which a climb has stalled [units of the tangent space]
+constexpr double kShort = 1e-4;      // trust radius below which refused steps are seen as kinks
+constexpr double kCutReach = 20.0;   // cuts farther away than so many trust radii are dropped
+constexpr double kSameSlope = 1e-3;  // relative difference of slopes up to which there is no kink between
+constexpr double kKinkSize = 1e-5;   // at most so far from a kink its slopes are taken when a climb converges
+constexpr double kKinkStep = 1e-7;   // of differences near a kink, so that they do not reach across it
 constexpr std::size_t kMostCuts = 60;
 constexpr double kTiny = 1e-7, kSampled = 1e-5;  // trust radius at which slopes around are sampled, and how far
 constexpr int kMostSamplings = 4;
-constexpr int kChallenges = 3;              // times that a maximum may prove to be none
-constexpr double kChallengeGain = 1e-8;     // of the index, relative, that shows it
-constexpr double kSameEnd = 1e-6;           // relative difference of indices that rounding of requirements makes
+constexpr int kChallenges = 3;           // times that a maximum may prove to be none
+constexpr double kChallengeGain = 1e-8;  // of the index, relative, that shows it
+constexpr double kSameEnd = 1e-6;        // relative difference of indices that rounding of requirements makes
 
 double missed_of(double slack) { return std::max(-slack, 0.0); }
 
@@ -77,7 +77,8 @@ bool Climber::gets_nowhere(int steps) {
     return status_ == ClimbStatus::not_met;
   }
   if (!repairing_ && steps % kTinySteps == 0) {
-    const bool still = trust_radius_ < kShort && has_best_ && best_.value <= best_before_ + kTinyGain * std::abs(best_before_);
+    const bool still =
+        trust_radius_ < kShort && has_best_ && best_.value <= best_before_ + kTinyGain * std::abs(best_before_);
     status_ = still ? ClimbStatus::stalled : ClimbStatus::given_up;
     best_before_ = has_best_ ? best_.value : -HUGE_VAL;
     return still;
@@ -224,7 +225,8 @@ Climber::Outcome Climber::step() {
   return Outcome::taken;
 }
 
-// The programme of the current grasp, with a penalty large enough that its step repairs what is missed; and the residual.
+// The programme of the current grasp, with a penalty large enough that its step repairs what is missed; and the
+// residual.
 bool Climber::solve() {
   for (int tries = 0;; ++tries) {
     if (!program_.solve(B_, g_, rows_, cuts_, trust_radius_, current_.missed > kHardlyMissed ? penalty_ : 0.0)) {
@@ -240,10 +242,10 @@ bool Climber::solve() {
   }
   lambda_ = program_.multipliers();
   const double held = lambda_.sum();
-  if (held > 0.5 * penalty_ && !repairing_ && !(program_.missed() > 0.0)) penalty_ = std::min(4.0 * held, kLargestPenalty);
+  if (held > 0.5 * penalty_ && !repairing_ && !(program_.missed() > 0.0))
+    penalty_ = std::min(4.0 * held, kLargestPenalty);
   kkt_ = std::max(program_.left_over().lpNorm<Eigen::Infinity>(), current_.missed > kMet ? current_.missed : 0.0);
-  for (int row = 0; row < rows_.size(); ++row)
-    kkt_ = std::max(kkt_, lambda_(row) * std::max(rows_.value(row), 0.0));
+  for (int row = 0; row < rows_.size(); ++row) kkt_ = std::max(kkt_, lambda_(row) * std::max(rows_.value(row), 0.0));
   return true;
 }
 
@@ -309,8 +311,8 @@ void Climber::take() {
       if (!(lambda_(row) > 0.0)) continue;
       const int now = rows_.find(old_rows_.id(row));
       if (now < 0) continue;
-      y += lambda_(row) * (Eigen::Map<const Vector>(old_rows_.slopes(row), k_) -
-                           Eigen::Map<const Vector>(rows_.slopes(now), k_));
+      y += lambda_(row) *
+           (Eigen::Map<const Vector>(old_rows_.slopes(row), k_) - Eigen::Map<const Vector>(rows_.slopes(now), k_));
     }
     update_curvature(y);
   } else {
@@ -378,7 +380,8 @@ void Climber::add_cuts(const Vector& w) {
     const int here = kept.find(rows_.id(row));
     double value = rows_.value(row) - slopes.dot(w);
     value = std::max(value, here >= 0 ? std::min(kept.value(here), value + kShort) : 0.0);
-    if (here >= 0 && (slopes - Eigen::Map<const Vector>(kept.slopes(here), k_)).norm() < kSameSlope * slopes.norm()) continue;
+    if (here >= 0 && (slopes - Eigen::Map<const Vector>(kept.slopes(here), k_)).norm() < kSameSlope * slopes.norm())
+      continue;
     if (value < trust_radius_ * slopes.lpNorm<1>()) cuts_.push_back({false, value, slopes, w});
   }
   if (cuts_.size() > kMostCuts) cuts_.erase(cuts_.begin(), cuts_.end() - kMostCuts);
@@ -436,7 +439,8 @@ void Climber::keep_if_best() {
 
 ClimbEnd Climber::end() const {
   const bool current_is_met = !repairing_ && !current_.blocked && current_.missed <= kMet;
-  const bool best_is_better = has_best_ && (!current_is_met || best_.value > current_.value + kSameEnd * std::abs(best_.value));
+  const bool best_is_better =
+      has_best_ && (!current_is_met || best_.value > current_.value + kSameEnd * std::abs(best_.value));
   const Point& point = best_is_better ? best_ : current_;
   ClimbEnd found{point.x, point.value, 0.0, kkt_, status_, values_, evaluations_};
   if (!has_best_) {

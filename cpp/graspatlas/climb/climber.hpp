@@ -20,9 +20,9 @@ enum class ClimbStatus { converged, stalled, given_up, not_met };
 /// Where a climb ended.
 struct ClimbEnd {
   std::vector<double> x;
-  double value;                ///< of the index
-  double missed;               ///< by how much the requirement that is missed most is; 0 where all are met
-  double kkt;                  ///< residual of the conditions of Karush, Kuhn and Tucker
+  double value;   ///< of the index
+  double missed;  ///< by how much the requirement that is missed most is; 0 where all are met
+  double kkt;     ///< residual of the conditions of Karush, Kuhn and Tucker
   ClimbStatus status;
   std::vector<double> values;  ///< of the index, where the requirements were first met and after each step from there
   int evaluations;             ///< grasps that were looked at
@@ -107,7 +107,7 @@ class Climber {
   Point current_, trial_, best_;
   std::vector<double> Phi_, trial_Phi_, step_;
   bool has_best_ = false, repairing_ = false, logarithmic_ = false, has_curvature_ = false;
-  double scale_ = 1.0;          // divides the index and its slopes
+  double scale_ = 1.0;  // divides the index and its slopes
   Vector g_, w_, lambda_;
   Rows rows_, old_rows_, index_row_;
   Matrix B_;

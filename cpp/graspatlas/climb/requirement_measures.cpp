@@ -7,10 +7,10 @@ namespace graspatlas {
 
 namespace {
 
-constexpr double kFarOpen = -1.0;       // below this the slack of closure counts by its logarithm
-constexpr double kLeastSlack = -1e6;    // where internal forces cannot press at all
-constexpr double kApart = 1e-5;         // kept beyond the distance asked for: shapes that touch have no normal [m]
-constexpr double kTouching = 1e-5;      // a fingertip this near the object touches it where it should [m]
+constexpr double kFarOpen = -1.0;     // below this the slack of closure counts by its logarithm
+constexpr double kLeastSlack = -1e6;  // where internal forces cannot press at all
+constexpr double kApart = 1e-5;       // kept beyond the distance asked for: shapes that touch have no normal [m]
+constexpr double kTouching = 1e-5;    // a fingertip this near the object touches it where it should [m]
 
 }  // namespace
 
@@ -105,8 +105,8 @@ double DistancesMeasure::slack(int pair, double distance) const {
 // Distance of the watched points along their normal, where the model is.
 double DistancesMeasure::along_normal(const Watched& watched) const {
   const Placement &first = model_.placement(watched.first_joint), &second = model_.placement(watched.second_joint);
-  return watched.normal.dot(second.rotation * watched.on_second + second.translation - first.rotation * watched.on_first -
-                            first.translation);
+  return watched.normal.dot(second.rotation * watched.on_second + second.translation -
+                            first.rotation * watched.on_first - first.translation);
 }
 
 void DistancesMeasure::linearize(const Surroundings& at, double reach, Rows& rows) {

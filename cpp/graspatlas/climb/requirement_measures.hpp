@@ -40,7 +40,9 @@ class JointMarginMeasure : public Measure {
     int at;  // number of the joint in x
     double sign, limit;
   };
-  double slack(const Limit& limit, const double* x) const { return limit.sign * (x[limit.at] - limit.limit) - distance_; }
+  double slack(const Limit& limit, const double* x) const {
+    return limit.sign * (x[limit.at] - limit.limit) - distance_;
+  }
 
   double distance_;
   std::vector<Limit> limits_;

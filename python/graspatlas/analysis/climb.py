@@ -87,10 +87,10 @@ def climb(
 ) -> Climb:
     """Climb to a local maximum of the index, on the manifold, within its bounds and the result's requirements.
 
-    The compiled core climbs by sequential quadratic programming in the tangent spaces of the grasps that it passes, with
-    bounds and requirements as constraints: see ``cpp/graspatlas/climb/climber.hpp``. It ends where the index has no
-    slope that they do not hold back, and where no grasp of a sample around is better. An index or a requirement that is
-    a function of yours is asked by the core.
+    The compiled core climbs by sequential quadratic programming in the tangent spaces of the grasps that it passes,
+    with bounds and requirements as constraints: see ``cpp/graspatlas/climb/climber.hpp``. It ends where the index has
+    no slope that they do not hold back, and where no grasp of a sample around is better. An index or a requirement that
+    is a function of yours is asked by the core.
 
     Args:
         result: The result; its index may be any callable.

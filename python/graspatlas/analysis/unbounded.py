@@ -37,7 +37,7 @@ MOST_STEPS = 200
 
 
 class Neighbourhood:
-    """The tangent space at a grasp, in coordinates w [k] with |w| = 1 at a radius, and the index of the points above it.
+    """The tangent space at a grasp, in coordinates w [k] with |w| = 1 at a radius, and the index above it.
 
     Args:
         objective: The index, and what grasps must meet.

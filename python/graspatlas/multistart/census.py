@@ -74,7 +74,7 @@ class Census:
         self.met += int(new.met.sum())
         if new.kind is not RoundKind.STATED:
             self._counted += int(new.met.sum())
-        for i in np.flatnonzero(new.met):
+        for i in np.flatnonzero(new.met).tolist():
             self._take(new.x[i], float(new.value[i]), float(new.kkt[i]), bool(new.converged[i]))
         if self.met:
             self.least_missed = None

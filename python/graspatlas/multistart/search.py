@@ -131,10 +131,8 @@ class Search:
         if best is None:
             show("none meets the requirements yet", refresh=False)
         else:
-            show(
-                f"best {best.value:.6g}, {len(self.census.peaks)} maxima, {self.census.share_missing:.1%} may be missing",
-                refresh=False,
-            )
+            missing = f"{self.census.share_missing:.1%} may be missing"
+            show(f"best {best.value:.6g}, {len(self.census.peaks)} maxima, {missing}", refresh=False)
 
     def _ended(self, deadline: float) -> SearchEnd | None:
         """Why the search ends here; None where it goes on."""
@@ -226,7 +224,9 @@ def nothing_meets(plan: Plan, census: Census) -> GraspAtlasError:
             alone = Objective(plan.problem, objective.system, plan.quality, (requirement,), FIRST_STEP)
             if not alone.meets(x)[0]:
                 by = float(alone.missed(x)[0])
-                parts.append(f"{requirement_name(requirement)} by {by:.3g}" if np.isfinite(by) else requirement_name(requirement))
+                parts.append(
+                    f"{requirement_name(requirement)} by {by:.3g}" if np.isfinite(by) else requirement_name(requirement)
+                )
         said = "the nearest misses " + (" and ".join(parts) or f"a bound by {census.least_missed[0]:.3g}")
     return GraspAtlasError(
         f"no feasible grasp of problem '{plan.problem.name}' that meets the requirements was found in {census.climbs} "

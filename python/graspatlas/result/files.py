@@ -81,9 +81,9 @@ def save_result(result: GraspAtlas, path: str | os.PathLike[str]) -> None:
     }
     extra: dict[str, AnyArray] = {f"other_{i}": values for i, values in enumerate(result.others.values())}
     if result.refinement is not None:
-        header["refinement"] = {name: getattr(result.refinement, name) for name in _REFINEMENT_FLAGS}
-        if result.refinement.search is not None:
-            header["refinement"]["search"] = asdict(result.refinement.search)
+        flags = {name: getattr(result.refinement, name) for name in _REFINEMENT_FLAGS}
+        search = result.refinement.search
+        header["refinement"] = flags if search is None else {**flags, "search": asdict(search)}
         extra |= {f"refined_{name}": getattr(result.refinement, name) for name in _REFINEMENT_ARRAYS}
     arrays: dict[str, Any] = {"qualities": result.qualities, "accepted": result.accepted, **extra}
     arrays |= result.atlas.to_arrays()

@@ -129,8 +129,8 @@ class Refinement:
             )
         if self.statuses[0] is PeakStatus.STALLED:
             return (
-                "no smaller step gains anything there, but the slope of the index does not vanish: it has a kink there, "
-                "or is not known to more digits"
+                "no smaller step gains anything there, but the slope of the index does not vanish: it has a kink "
+                "there, or is not known to more digits"
             )
         if self.statuses[0] is PeakStatus.GIVEN_UP and self.complete and self.search is None:
             return (

@@ -190,8 +190,8 @@ class GraspSearch:
     def _tried(self, starts: Array) -> Array:
         """The feasible grasps to which starts lead."""
         self.tries += len(starts)
-        X, there = _core.project_far(self.system, starts)
-        X = X[there]
+        projected, there = _core.project_far(self.system, starts)
+        X: Array = np.asarray(projected)[np.asarray(there)]
         X = X[[self._starts.has_posture_of(x) for x in X]] if len(X) else X
         X = X[self._opposed(X)] if len(X) else X
         self.found += len(X)
