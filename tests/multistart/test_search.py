@@ -238,3 +238,16 @@ def test_the_can_is_better_than_its_slice_by_far() -> None:
     ]
     assert min(bests) > 734_800.0
     assert np.ptp(bests) < 1e-4 * max(bests)
+
+
+def test_a_result_without_accepted_charts_is_drawn(problem: ga.Problem, tmp_path: Path) -> None:
+    """F may hold grasps that meet a requirement which no chart of the slice meets."""
+    closure = ga.ForceClosure(0.5, 0.145)
+    result = ga.optimize(problem, motions="all", require=[closure])
+    assert not result.accepted.any()
+    assert result.gain == float("inf")
+    assert result.check().passed
+    assert result.summary()["refined"]["gain"] is None
+    ga.save_picture(result, tmp_path / "best.png", width=320, height=180)
+    ga.export_html(result, tmp_path / "best.html")
+    assert (tmp_path / "best.png").stat().st_size > 5_000
