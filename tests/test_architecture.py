@@ -19,7 +19,7 @@ FLOORS = (
     *("_core", "version", "errors", "start_up", "libraries"),
     *("support", "systems", "patches", "hand", "problem", "collision", "execution"),
     *("atlas", "grasps", "search", "quality", "requirements"),
-    *("testing", "result", "problem_files", "problems", "analysis", "paths", "optimizer", "simulation", "formats"),
+    *("testing", "result", "problem_files", "problems", "analysis", "paths", "multistart", "optimizer", "simulation", "formats"),
     *("viewer.scene", "viewer.render", "viewer.web", "viewer.figures", "viewer"),
     *("reproduce", "sweep", "commands", "cli", "__main__"),
 )

@@ -26,6 +26,7 @@ namespace graspatlas {
 
 namespace {
 
+using EndTable = py::typing::Dict<py::str, py::object>;
 using PythonFunction = py::typing::Callable<py::array(py::array)>;
 /// Of one grasp [1 x configuration_size]: a function of grasps near it that returns rows of numbers.
 using NearFunction = py::typing::Callable<PythonFunction(py::array)>;
@@ -149,7 +150,7 @@ MeasureRecipe test_recipe(const PythonFunction& met) {
 }
 
 /// The ends of the climbs as arrays, one row or number each; `values` is a list of arrays.
-py::dict table_of(const std::vector<ClimbEnd>& ends, int size) {
+EndTable table_of(const std::vector<ClimbEnd>& ends, int size) {
   const auto n = static_cast<py::ssize_t>(ends.size());
   py::array_t<double> x = matrix<double>(n, size), value(n), missed(n), kkt(n);
   py::array_t<int> evaluations(n);
@@ -164,7 +165,7 @@ py::dict table_of(const std::vector<ClimbEnd>& ends, int size) {
     statuses.append(name_of(end.status));
     values.append(py::array_t<double>(static_cast<py::ssize_t>(end.values.size()), end.values.data()));
   }
-  py::dict table;
+  EndTable table;
   table["x"] = x;
   table["value"] = value;
   table["missed"] = missed;
@@ -203,7 +204,7 @@ void until(std::optional<double> max_seconds, const Work& work) {
   if (interrupted) throw py::error_already_set();
 }
 
-py::dict climbs(GraspSystem& system, const DoubleArray& X, const MeasureRecipe& index,
+EndTable climbs(GraspSystem& system, const DoubleArray& X, const MeasureRecipe& index,
                 const std::vector<MeasureRecipe>& requirements, double trust_radius, int max_steps,
                 std::optional<double> max_seconds, std::optional<int> threads) {
   check_rows(system, X);

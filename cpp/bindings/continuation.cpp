@@ -9,6 +9,7 @@
 #include "graspatlas/continuation/neighbours.hpp"
 #include "graspatlas/continuation/polytope.hpp"
 #include "graspatlas/errors.hpp"
+#include "graspatlas/manifold/far_projection.hpp"
 #include "graspatlas/manifold/lease.hpp"
 #include "graspatlas/manifold/newton.hpp"
 #include "graspatlas/manifold/toy_systems.hpp"
@@ -282,6 +283,31 @@ void bind_parts(py::module_& module) {
           py::arg("point"), py::arg("distance"), "Numbers of the points within a distance, ascending.");
 }
 
+/// Rows that did not get there are left where the method ended.
+py::typing::Tuple<py::array_t<double>, py::array_t<bool>> project_far(System& system, const DoubleArray& X) {
+  const py::ssize_t n = X.ndim() == 2 ? X.shape(0) : 0, size = system.configuration_size();
+  if (X.ndim() != 2 || X.shape(1) != size)
+    throw Error("X must have " + std::to_string(size) + " columns, one row for each point");
+  py::array_t<double> out = matrix<double>(n, size);
+  py::array_t<bool> there(n);
+  double* x = out.mutable_data();
+  bool* flags = there.mutable_data();
+  std::copy_n(X.data(), n * size, x);
+  const bool clones = system.clone() != nullptr;
+  const auto work = [&](int, std::int64_t first, std::int64_t last) {
+    const Lease own(system);
+    FarProjection projection(*own);
+    for (std::int64_t row = first; row < last; ++row) flags[row] = projection.project(x + row * size);
+  };
+  if (clones) {
+    const py::gil_scoped_release release;
+    parallel_for(n > 1 ? available_threads() : 1, n, work);
+  } else {
+    work(0, 0, n);
+  }
+  return py::make_tuple(out, there);
+}
+
 }  // namespace
 
 void bind_continuation(py::module_& module) {
@@ -308,6 +334,10 @@ void bind_continuation(py::module_& module) {
       py::arg("system"), py::arg("x"), py::arg("Phi"), py::arg("u"),
       "Point of the manifold above u in the tangent space at x (eqs 14 and 15); None when Newton does not "
       "converge.");
+  module.def(
+      "project_far", &project_far, py::arg("system"), py::arg("X"),
+      "Points X [n x configuration_size], which may be far off, moved to the manifold and within the bounds; and "
+      "whether each got there [n]. See manifold/far_projection.hpp.");
 }
 
 }  // namespace graspatlas

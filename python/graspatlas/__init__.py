@@ -14,6 +14,7 @@ from graspatlas.analysis.refine import refine
 from graspatlas.atlas.atlas import Atlas
 from graspatlas.atlas.build import build_atlas
 from graspatlas.atlas.status import Closed, Status
+from graspatlas.atlas.upper_bounds import estimate_upper_bounds
 from graspatlas.errors import GraspAtlasError
 from graspatlas.execution.approach import Approach
 from graspatlas.execution.contact_forces import ContactForces
@@ -26,7 +27,10 @@ from graspatlas.hand.body import Body
 from graspatlas.hand.hand import Hand
 from graspatlas.hand.motions import HandMotions
 from graspatlas.optimizer.components import Components, SearchStatus, find_components
+from graspatlas.optimizer.ladder import ladder
+from graspatlas.optimizer.ladder_outcome import Ladder
 from graspatlas.optimizer.optimize import optimize
+from graspatlas.optimizer.rungs import Rung
 from graspatlas.paths.path import GraspPath, Path
 from graspatlas.paths.shortest_path import shortest_path
 from graspatlas.problem.contacts import Contact
@@ -39,6 +43,7 @@ from graspatlas.requirements.collision_free import CollisionFree
 from graspatlas.requirements.force_closure import ForceClosure
 from graspatlas.requirements.holding_force import HoldingForce
 from graspatlas.requirements.joint_margin import JointMargin
+from graspatlas.result.gap import Gap
 from graspatlas.result.refinement import Refinement
 from graspatlas.result.result import Result, load_result
 from graspatlas.search.grasp_search import find_grasps
@@ -58,6 +63,7 @@ if typing.TYPE_CHECKING:
         plot_ellipsoid,
         plot_growth,
         plot_holding,
+        plot_ladder,
         plot_local_maxima,
         plot_pareto,
         plot_planar_grasp,
@@ -76,6 +82,7 @@ __all__ = [
     "ContactForces",
     "FirstGrasp",
     "ForceClosure",
+    "Gap",
     "Grasp",
     "GraspAtlasError",
     "GraspPath",
@@ -84,6 +91,7 @@ __all__ = [
     "HandMotions",
     "HoldingForce",
     "JointMargin",
+    "Ladder",
     "Path",
     "Peak",
     "PoseGuess",
@@ -92,6 +100,7 @@ __all__ = [
     "Recording",
     "Refinement",
     "Result",
+    "Rung",
     "Samples",
     "SearchStatus",
     "Simulation",
@@ -102,10 +111,12 @@ __all__ = [
     "bundled_problems",
     "climb",
     "densify",
+    "estimate_upper_bounds",
     "export_grasps",
     "export_html",
     "find_components",
     "find_grasps",
+    "ladder",
     "load_problem",
     "load_result",
     "load_simulation",
@@ -121,6 +132,7 @@ __all__ = [
     "plot_ellipsoid",
     "plot_growth",
     "plot_holding",
+    "plot_ladder",
     "plot_local_maxima",
     "plot_pareto",
     "plot_planar_grasp",

@@ -23,6 +23,7 @@ __all__: list[str] = [
     "GraspSystem",
     "HoldingLimits",
     "JointInfo",
+    "Measure",
     "Model",
     "Neighbours",
     "Patch",
@@ -36,20 +37,31 @@ __all__: list[str] = [
     "Torus",
     "TorusPatch",
     "available_threads",
+    "axes_measure",
     "ball_radii",
     "box_half_width",
+    "climbs",
+    "closure_index_measure",
+    "closure_measure",
     "contact_forces",
     "distances_from_hull",
+    "distances_measure",
     "force_closure_margins",
     "force_closure_slacks",
     "holding_forces",
     "hull_volumes",
+    "joint_margin_measure",
     "min_weights",
+    "missed",
+    "numbers_measure",
     "project",
+    "project_far",
     "read_collision_shapes",
     "resisted_loads",
     "round_ball_radii",
     "semi_axes",
+    "slacks_measure",
+    "test_measure",
 ]
 
 class GraspAtlasError(ValueError):
@@ -694,9 +706,28 @@ class CollisionBatch:
         Distance of each point [palm] from the nearest of some shapes [n x points].
         """
 
+class Measure:
+    """
+    An index or requirement that climbs follow; see climb/measure.hpp.
+    """
+    @property
+    def any_thread(self) -> bool:
+        """
+        False where it asks Python.
+        """
+
 def available_threads() -> int:
     """
     Cores that this process may use.
+    """
+
+def axes_measure(
+    index: str,
+    connectivity: typing.SupportsInt | typing.SupportsIndex,
+    length_unit: typing.SupportsFloat | typing.SupportsIndex,
+) -> Measure:
+    """
+    An index of the manipulability ellipsoid; see climb/index_measures.hpp.
     """
 
 def ball_radii(
@@ -711,6 +742,34 @@ def box_half_width(
 ) -> float:
     """
     Half the width of the box that the polytopes of charts are cut from.
+    """
+
+def climbs(
+    system: GraspSystem,
+    X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    index: Measure,
+    requirements: collections.abc.Sequence[Measure],
+    trust_radius: typing.SupportsFloat | typing.SupportsIndex,
+    max_steps: typing.SupportsInt | typing.SupportsIndex,
+    max_seconds: typing.SupportsFloat | typing.SupportsIndex | None = None,
+    threads: typing.SupportsInt | typing.SupportsIndex | None = None,
+) -> dict[str, typing.Any]:
+    """
+    Climbs from each grasp of X [n x configuration_size] to a local maximum of the index within bounds and requirements: ends x [n x configuration_size], value, missed, kkt and evaluations [n], and lists of status and of values. See climb/climber.hpp.
+    """
+
+def closure_index_measure(friction: typing.SupportsFloat | typing.SupportsIndex) -> Measure:
+    """
+    The force-closure margin as an index, with its sign.
+    """
+
+def closure_measure(
+    friction: typing.SupportsFloat | typing.SupportsIndex,
+    torsional: typing.SupportsFloat | typing.SupportsIndex = 0.0,
+    margin: typing.SupportsFloat | typing.SupportsIndex = 0.0,
+) -> Measure:
+    """
+    The force-closure margin beyond one that is asked for.
     """
 
 def contact_forces(
@@ -730,6 +789,11 @@ def distances_from_hull(
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Distance of each point from the convex hull of others, 0 inside [n].
+    """
+
+def distances_measure(batch: CollisionBatch) -> Measure:
+    """
+    Distances of hand and object.
     """
 
 def force_closure_margins(
@@ -766,11 +830,34 @@ def hull_volumes(
     Volume of the hull of each grasp's wrenches [n x points x 3 or 6]; see wrench_hull.hpp.
     """
 
+def joint_margin_measure(distance: typing.SupportsFloat | typing.SupportsIndex) -> Measure:
+    """
+    Distances of the joints from their limits beyond one that is asked for.
+    """
+
 def min_weights(
     wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Min-weight metric, between 0 and 1, of each grasp's wrenches [n x points x 3 or 6]; see min_weight.hpp.
+    """
+
+def missed(
+    system: GraspSystem,
+    X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    requirements: collections.abc.Sequence[Measure],
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    By how much each grasp of X misses the requirement that it misses most, in about units of the tangent space [n]; infinite where a requirement that is met or not is not met.
+    """
+
+def numbers_measure(
+    values: collections.abc.Callable[
+        [numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]], numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]
+    ],
+) -> Measure:
+    """
+    An index that is a function of grasps [n x configuration_size] that returns numbers [n].
     """
 
 def project(
@@ -781,6 +868,13 @@ def project(
 ) -> typing.Any:
     """
     Point of the manifold above u in the tangent space at x (eqs 14 and 15); None when Newton does not converge.
+    """
+
+def project_far(
+    system: AnySystem, X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool]]:
+    """
+    Points X [n x configuration_size], which may be far off, moved to the manifold and within the bounds; and whether each got there [n]. See manifold/far_projection.hpp.
     """
 
 def read_collision_shapes(
@@ -814,4 +908,25 @@ def semi_axes(
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Ascending semi-axes of the manipulability ellipsoid of each grasp [n x object_dof]; see manipulability.hpp.
+    """
+
+def slacks_measure(
+    near: collections.abc.Callable[
+        [numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]],
+        collections.abc.Callable[
+            [numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]], numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]
+        ],
+    ],
+) -> Measure:
+    """
+    A requirement's slacks: a function of one grasp [1 x configuration_size] that returns a function of grasps near it [n x configuration_size], which returns slacks [n x c].
+    """
+
+def test_measure(
+    met: collections.abc.Callable[
+        [numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]], numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]
+    ],
+) -> Measure:
+    """
+    A requirement that is a function of grasps [n x configuration_size] that returns flags [n].
     """

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from graspatlas.commands.analysis import add_analysis_commands
 from graspatlas.commands.exit_status import INTERRUPTED, MISUSE
-from graspatlas.commands.listing import add_list_command
+from graspatlas.commands.ladder import add_ladder_command
 from graspatlas.commands.optimize import add_optimize_command
 from graspatlas.commands.problem import add_problem_commands
 from graspatlas.commands.reproduce import add_reproduce_command
@@ -103,7 +103,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     for add in (
-        *(add_list_command, add_problem_commands, add_optimize_command, add_result_commands, add_analysis_commands),
+        *(add_problem_commands, add_optimize_command, add_ladder_command, add_result_commands, add_analysis_commands),
         *(add_simulate_command, add_sweep_command, add_reproduce_command),
     ):
         add(commands)

@@ -1,4 +1,4 @@
-"""Denser grids: near every point of the manifold, inside polytopes and bounds, and where the index jumps."""
+"""Denser grids: near every point of the manifold, inside polytopes and bounds, and where the index promises most."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 
 import graspatlas as ga
-from graspatlas.analysis.densify import densify, jumps
+from graspatlas.analysis.densify import by_promise, densify, jumps
 from graspatlas.atlas.grid import Grid, _nearest_points, lay_grid, most_samples
 from graspatlas.cli import main
 from graspatlas.requirements.lost import Lost
@@ -257,13 +257,20 @@ def test_jumps_by_hand(small_result: ga.Result) -> None:
     np.testing.assert_array_equal(jumps(replace(result, accepted=np.zeros_like(feasible))), 0.0)
 
 
-def test_a_share_fills_the_charts_that_jump_most(small_result: ga.Result) -> None:
+def test_a_share_fills_the_charts_that_promise_most(small_result: ga.Result) -> None:
+    """The charts that could hold a better grasp, then those where the index jumps most."""
     n = small_result.atlas.n_charts
     samples = densify(small_result, 0.07, share=0.1)
     filled = np.unique(samples.charts)
     assert len(filled) == int(np.ceil(0.1 * n))
+    gap = small_result.gap
+    assert 0 < gap.n_charts < len(filled)
+    assert set(gap.charts) <= set(filled)
+    others = np.setdiff1d(filled, [*gap.charts, *gap.unknown])
     left = np.setdiff1d(np.arange(n), filled)
-    assert jumps(small_result)[filled].min() >= jumps(small_result)[left].max()
+    assert len(others) > 0
+    assert jumps(small_result)[others].min() >= jumps(small_result)[left].max()
+    np.testing.assert_array_equal(np.unique(densify(small_result, 0.07, share=0.5 / n).charts), gap.charts[:1])
     everywhere = densify(small_result, 0.07)
     np.testing.assert_array_equal(samples.x, everywhere.x[np.isin(everywhere.charts, filled)])
     np.testing.assert_allclose(samples.qualities, everywhere.qualities[np.isin(everywhere.charts, filled)])
@@ -285,7 +292,14 @@ def test_interrupted_work_is_kept(small_result: ga.Result, monkeypatch: pytest.M
     assert not samples.complete
     assert whole.complete
     assert len(samples) == len(samples.qualities) == len(samples.accepted) == sum(calls[:3])
-    np.testing.assert_array_equal(samples.x, whole.x[: len(samples)])
+    assert (np.diff(samples.charts) >= 0).all()
+    # What was filled are the charts that promise most; the last of them may lack samples.
+    filled = [int(chart) for chart in by_promise(small_result) if chart in samples.charts]
+    np.testing.assert_array_equal(filled, by_promise(small_result)[: len(filled)])
+    rows, theirs = np.isin(samples.charts, filled[:-1]), np.isin(whole.charts, filled[:-1])
+    np.testing.assert_array_equal(samples.x[rows], whole.x[theirs])
+    longest = ga.Grasps(small_result.problem, whole.x[theirs]).semi_axes[:, 0]
+    np.testing.assert_allclose(samples.qualities[rows], longest, rtol=1e-12)
     assert samples.best.quality == samples.qualities.max()
 
 

@@ -43,6 +43,10 @@ FIELDS = {
     "max_residual": float,
     "quality": {"name": str, "best": float, "worst": float, "at_x1": float},
     "best": {"q": list, "object_xyz": list, "object_quat_xyzw": list, "chart": int},
+    "gap": {
+        **{"kind": str, "n_charts": int, "n_rejected": int, "n_unknown": int},
+        **{"best": float, "bound": float, "share": float},
+    },
 }
 
 

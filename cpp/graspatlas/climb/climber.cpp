@@ -13,24 +13,35 @@ namespace {
 constexpr int kIdsOfRequirement = 1 << 20;  // more than any requirement has rows
 // Of the penalty: where it starts, and the most that it becomes. [relative gain of the index for a unit missed]
 constexpr double kFirstPenalty = 10.0, kLargestPenalty = 1e8;
-constexpr double kLeastProgress = 0.1;      // share of what is missed that a step must promise to repair
+constexpr double kLeastProgress = 0.1;  // share of what is missed that a step must promise to repair
 // A repair goes on while each so many steps leave less than this share of what was missed before.
 constexpr int kRepairSteps = 10;
 constexpr double kRepairShare = 0.8;
-constexpr double kAccepted = 1e-4;          // share of the promised gain that a step must give
-constexpr double kRounding = 1e-11;         // of gains
-constexpr double kMet = 0.5e-8;             // a slack may miss the inside of a requirement by so much
-constexpr double kGrowth = 2.5, kMostGrowth = 4.0;   // of the trust radius
-constexpr double kShortest = 1e-9;          // trust radius at which a climb has stalled [units of the tangent space]
-constexpr double kShort = 1e-4;             // trust radius below which refused steps are seen as kinks
-constexpr double kCutReach = 20.0;          // cuts farther away than so many trust radii are dropped
-constexpr double kSameSlope = 1e-3;         // relative difference of slopes up to which there is no kink between
-constexpr double kKinkSize = 1e-5;          // at most so far from a kink its slopes are taken when a climb converges
-constexpr double kKinkStep = 1e-7;          // of differences near a kink, so that they do not reach across it
+// A climb ends where each so many steps, all of them tiny, gain less than this.
+constexpr int kTinySteps = 25;
+constexpr double kTinyGain = 1e-9;
+constexpr double kAccepted = 1e-4;                  // share of the promised gain that a step must give
+constexpr double kRounding = 1e-11;                 // of gains
+constexpr double kRoundingOfSlacks = 2e-9;          // distances are known to 1e-10 m
+constexpr double kMet = 0.5e-8;                     // a slack may miss the inside of a requirement by so much
+constexpr double kSteered = 1e-7;                   // what is missed by less does not make the penalty larger
+constexpr double kHardlyMissed = 1e-9;              // what is not made good by the next step
+constexpr double kGrowth = 2.5, kMostGrowth = 4.0;  // of the trust radius
+constexpr double kShortest = 1e-9;   // trust radius at which a climb has stalled [units of the tangent space]
+constexpr double kShort = 1e-4;      // trust radius below which refused steps are seen as kinks
+constexpr double kCutReach = 20.0;   // cuts farther away than so many trust radii are dropped
+constexpr double kSameSlope = 1e-3;  // relative difference of slopes up to which there is no kink between
+constexpr double kKinkSize = 1e-5;   // at most so far from a kink its slopes are taken when a climb converges
+constexpr double kKinkStep = 1e-7;   // of differences near a kink, so that they do not reach across it
 constexpr std::size_t kMostCuts = 60;
-constexpr int kChallenges = 3;              // times that a maximum may prove to be none
-constexpr double kChallengeGain = 1e-8;     // of the index, relative, that shows it
-constexpr double kSameEnd = 1e-6;           // relative difference of indices that rounding of requirements makes
+constexpr double kTiny = 1e-7, kSampled = 1e-5;  // trust radius at which slopes around are sampled, and how far
+constexpr int kMostSamplings = 4;
+constexpr double kSharp = 1e-3;          // relative fall of the index within a step of the differences
+constexpr int kChallenges = 3;           // times that a maximum may prove to be none
+constexpr double kChallengeGain = 1e-8;  // of the index, relative, that shows it
+constexpr double kSameEnd = 1e-6;        // relative difference of indices that rounding of requirements makes
+
+double missed_of(double slack) { return std::max(-slack, 0.0); }
 
 }  // namespace
 
@@ -53,19 +64,27 @@ Climber::Climber(System& system, Measure& index, std::vector<Measure*> requireme
 ClimbEnd Climber::climb(const double* x, const std::function<bool()>& on) {
   if (begin(x)) {
     status_ = ClimbStatus::given_up;
-    double missed_before = HUGE_VAL;
-    for (int steps = 0; steps < options_.max_steps && on(); ++steps) {
-      if (repairing_ && steps % kRepairSteps == 0) {
-        if (current_.missed > kRepairShare * missed_before) {
-          status_ = ClimbStatus::not_met;
-          break;
-        }
-        missed_before = current_.missed;
-      }
-      if (step() == Outcome::ended) break;
-    }
+    for (int steps = 0; steps < options_.max_steps && on(); ++steps)
+      if (gets_nowhere(steps) || step() == Outcome::ended) break;
   }
   return end();
+}
+
+// Looks back now and then: whether a repair makes too little good, or a climb gains next to nothing in tiny steps.
+bool Climber::gets_nowhere(int steps) {
+  if (repairing_ && steps % kRepairSteps == 0) {
+    status_ = current_.missed > kRepairShare * missed_before_ ? ClimbStatus::not_met : ClimbStatus::given_up;
+    missed_before_ = current_.missed;
+    return status_ == ClimbStatus::not_met;
+  }
+  if (!repairing_ && steps % kTinySteps == 0) {
+    const bool still =
+        trust_radius_ < kShort && has_best_ && best_.value <= best_before_ + kTinyGain * std::abs(best_before_);
+    status_ = still ? ClimbStatus::stalled : ClimbStatus::given_up;
+    best_before_ = has_best_ ? best_.value : -HUGE_VAL;
+    return still;
+  }
+  return false;
 }
 
 double Climber::missed(const double* x) {
@@ -81,10 +100,12 @@ bool Climber::begin(const double* x) {
   trust_radius_ = options_.trust_radius;
   penalty_ = kFirstPenalty;
   kkt_ = HUGE_VAL;
+  missed_before_ = HUGE_VAL;
+  best_before_ = -HUGE_VAL;
   cuts_.clear();
   here_.set_step(Surroundings::kStep);
   values_.clear();
-  evaluations_ = challenges_ = 0;
+  evaluations_ = challenges_ = samplings_ = 0;
   status_ = ClimbStatus::stalled;
   if (newton_.project_freely(current_.x.data(), Phi_.data()) != Projection::converged) return false;
   B_ = Matrix::Identity(k_, k_);
@@ -96,7 +117,7 @@ bool Climber::begin(const double* x) {
   trial_.slacks.resize(static_cast<std::size_t>(rows_.size()));
   look_at_trial();
   std::swap(trial_, current_);
-  if (!(current_.missed > 0.0) && !current_.blocked) start_climbing();
+  if (!(current_.missed > kMet) && !current_.blocked) start_climbing();
   return true;
 }
 
@@ -116,7 +137,7 @@ void Climber::linearize(const std::vector<double>& x, const std::vector<double>&
 void Climber::linearize_current() {
   linearize(current_.x, Phi_, !repairing_);
   current_.missed = 0.0;
-  for (int row = 0; row < rows_.size(); ++row) current_.missed = std::max(current_.missed, -rows_.value(row) - kMet);
+  for (int row = 0; row < rows_.size(); ++row) current_.missed = std::max(current_.missed, missed_of(rows_.value(row)));
   set_slope();
 }
 
@@ -165,14 +186,18 @@ Climber::Outcome Climber::end_step(ClimbStatus status) {
 }
 
 Climber::Outcome Climber::step() {
+  if (!repairing_ && trust_radius_ < kTiny && samplings_ < kMostSamplings) sample_cuts();
   if (!solve()) return end_step(repairing_ ? ClimbStatus::not_met : ClimbStatus::stalled);
   w_ = program_.w();
   const double size = w_.lpNorm<Eigen::Infinity>();
-  const double promised = program_.model_gain() + penalty_ * (current_.missed - std::max(program_.missed() - kMet, 0.0));
-  if (!repairing_ && kkt_ < kConverged && current_.missed <= 0.0) {
+  const double promised = program_.model_gain() + penalty_ * (current_.missed - program_.missed());
+  if (!repairing_ && kkt_ < kConverged && current_.missed <= kMet) {
     double farthest = 0.0;
     for (const Cut& cut : cuts_) farthest = std::max(farthest, cut.at.lpNorm<Eigen::Infinity>());
-    if (farthest <= kKinkSize) return challenged() ? Outcome::taken : end_step(ClimbStatus::converged);
+    if (farthest <= kKinkSize) {
+      if (falls_at_once()) return end_step(ClimbStatus::stalled);
+      return challenged() ? Outcome::taken : end_step(ClimbStatus::converged);
+    }
     trust_radius_ = std::max(0.1 * farthest / kCutReach, kShortest);
     shift_cuts(Vector::Zero(k_), 0.0);
     return Outcome::refused;
@@ -182,10 +207,11 @@ Climber::Outcome Climber::step() {
     return end_step(ClimbStatus::not_met);
   if (!(size > 0.0) || !(promised > 0.0) || trust_radius_ < kShortest)
     return end_step(repairing_ ? ClimbStatus::not_met : ClimbStatus::stalled);
-  bool good = try_step(w_) && merit_gain() >= kAccepted * promised - kRounding;
+  const double rounding = kRounding + penalty_ * kRoundingOfSlacks;
+  bool good = try_step(w_) && merit_gain() >= kAccepted * promised - rounding;
   if (!good && !trial_.x.empty() && !trial_.blocked && trial_.missed > current_.missed && cuts_.empty()) {
     const Vector corrected = corrected_step(w_);
-    if (corrected.size() > 0 && try_step(corrected) && merit_gain() >= kAccepted * promised - kRounding) {
+    if (corrected.size() > 0 && try_step(corrected) && merit_gain() >= kAccepted * promised - rounding) {
       w_ = corrected;
       good = true;
     }
@@ -203,26 +229,27 @@ Climber::Outcome Climber::step() {
   return Outcome::taken;
 }
 
-// The programme of the current grasp, with a penalty large enough that its step repairs what is missed; and the residual.
+// The programme of the current grasp, with a penalty large enough that its step repairs what is missed; and the
+// residual.
 bool Climber::solve() {
   for (int tries = 0;; ++tries) {
-    if (!program_.solve(B_, g_, rows_, cuts_, trust_radius_, current_.missed > 0.0 ? penalty_ : 0.0)) {
+    if (!program_.solve(B_, g_, rows_, cuts_, trust_radius_, current_.missed > kHardlyMissed ? penalty_ : 0.0)) {
       if (tries > 0 || (!has_curvature_ && cuts_.empty())) return false;
       B_ = Matrix::Identity(k_, k_);
       has_curvature_ = false;
       cuts_.clear();
       continue;
     }
-    const bool repairs = program_.missed() <= (1.0 - kLeastProgress) * current_.missed + 1e-12;
-    if (repairs || repairing_ || penalty_ >= kLargestPenalty) break;
+    const bool repairs = program_.missed() <= (1.0 - kLeastProgress) * current_.missed;
+    if (repairs || repairing_ || current_.missed < kSteered || penalty_ >= kLargestPenalty) break;
     penalty_ *= 10.0;
   }
   lambda_ = program_.multipliers();
   const double held = lambda_.sum();
-  if (held > 0.5 * penalty_ && !repairing_) penalty_ = std::min(4.0 * held, kLargestPenalty);
-  kkt_ = std::max(program_.left_over().lpNorm<Eigen::Infinity>(), current_.missed);
-  for (int row = 0; row < rows_.size(); ++row)
-    kkt_ = std::max(kkt_, lambda_(row) * std::max(rows_.value(row), 0.0));
+  if (held > 0.5 * penalty_ && !repairing_ && !(program_.missed() > 0.0))
+    penalty_ = std::min(4.0 * held, kLargestPenalty);
+  kkt_ = std::max(program_.left_over().lpNorm<Eigen::Infinity>(), current_.missed > kMet ? current_.missed : 0.0);
+  for (int row = 0; row < rows_.size(); ++row) kkt_ = std::max(kkt_, lambda_(row) * std::max(rows_.value(row), 0.0));
   return true;
 }
 
@@ -250,7 +277,7 @@ void Climber::look_at_trial() {
     while (row < rows_.size() && rows_.id(row) / kIdsOfRequirement == static_cast<int>(r)) ++row;
   }
   trial_.missed = 0.0;
-  for (const double slack : trial_.slacks) trial_.missed = std::max(trial_.missed, -slack - kMet);
+  for (const double slack : trial_.slacks) trial_.missed = std::max(trial_.missed, missed_of(slack));
   if (!repairing_) index_.revisit(trial_.x.data(), &trial_.value);
   ++evaluations_;
 }
@@ -279,7 +306,7 @@ void Climber::take() {
   const Vector old_g = g_;
   linearize_current();
   if (repairing_) {
-    if (current_.missed <= 0.0 && !current_.blocked) start_climbing();
+    if (current_.missed <= kMet && !current_.blocked) start_climbing();
     return;
   }
   if (cuts_.empty()) {
@@ -288,8 +315,8 @@ void Climber::take() {
       if (!(lambda_(row) > 0.0)) continue;
       const int now = rows_.find(old_rows_.id(row));
       if (now < 0) continue;
-      y += lambda_(row) * (Eigen::Map<const Vector>(old_rows_.slopes(row), k_) -
-                           Eigen::Map<const Vector>(rows_.slopes(now), k_));
+      y += lambda_(row) *
+           (Eigen::Map<const Vector>(old_rows_.slopes(row), k_) - Eigen::Map<const Vector>(rows_.slopes(now), k_));
     }
     update_curvature(y);
   } else {
@@ -335,7 +362,7 @@ void Climber::refuse() {
 void Climber::shift_cuts(const Vector& w, double gained) {
   for (Cut& cut : cuts_) {
     cut.value += cut.slopes.dot(w) - (cut.of_index ? gained : 0.0);
-    if (cut.of_index || current_.missed <= 0.0) cut.value = std::max(cut.value, 0.0);
+    if (cut.of_index || current_.missed <= kMet) cut.value = std::max(cut.value, 0.0);
     cut.at -= w;
   }
   const double farthest = kCutReach * trust_radius_;
@@ -357,11 +384,42 @@ void Climber::add_cuts(const Vector& w) {
     const int here = kept.find(rows_.id(row));
     double value = rows_.value(row) - slopes.dot(w);
     value = std::max(value, here >= 0 ? std::min(kept.value(here), value + kShort) : 0.0);
-    if (here >= 0 && (slopes - Eigen::Map<const Vector>(kept.slopes(here), k_)).norm() < kSameSlope * slopes.norm()) continue;
+    if (here >= 0 && (slopes - Eigen::Map<const Vector>(kept.slopes(here), k_)).norm() < kSameSlope * slopes.norm())
+      continue;
     if (value < trust_radius_ * slopes.lpNorm<1>()) cuts_.push_back({false, value, slopes, w});
   }
   if (cuts_.size() > kMostCuts) cuts_.erase(cuts_.begin(), cuts_.end() - kMostCuts);
   linearize_current();  // so that measures remember the rows of the current grasp
+}
+
+// Slopes at random grasps around, where steps have become tiny: on a kink they tell what lies on its sides.
+void Climber::sample_cuts() {
+  const double radius = kSampled * std::pow(0.3, samplings_++);
+  cuts_.clear();
+  B_ = Matrix::Identity(k_, k_);
+  has_curvature_ = false;
+  here_.set_step(kKinkStep);
+  linearize_current();
+  SplitMix64 random(static_cast<std::uint64_t>(samplings_));
+  for (int i = 0; i < 2 * k_; ++i) {
+    Vector w(k_);
+    for (int a = 0; a < k_; ++a) w(a) = random.normal();
+    w *= radius / w.norm();
+    if (try_step(w)) add_cuts(w);
+  }
+  trust_radius_ = radius;
+}
+
+// Whether the index falls within the reach of the differences by more than a kink lets it: beside a pole differences
+// from both sides cancel, and what they give is no slope.
+bool Climber::falls_at_once() {
+  double value;
+  for (int i = 0; i < k_; ++i)
+    for (const double* x : {here_.ahead(i), here_.behind(i)}) {
+      index_.revisit(x, &value);
+      if (!(std::abs(gain(value)) < kSharp)) return true;
+    }
+  return false;
 }
 
 // Whether a grasp near a maximum is better after all; then the climb goes on from there.
@@ -390,14 +448,15 @@ bool Climber::challenged() {
 }
 
 void Climber::keep_if_best() {
-  if (current_.blocked || current_.missed > 0.0 || (has_best_ && current_.value < best_.value)) return;
+  if (current_.blocked || current_.missed > kMet || (has_best_ && current_.value < best_.value)) return;
   best_ = current_;
   has_best_ = true;
 }
 
 ClimbEnd Climber::end() const {
-  const bool current_is_met = !repairing_ && !current_.blocked && current_.missed <= 0.0;
-  const bool best_is_better = has_best_ && (!current_is_met || best_.value > current_.value + kSameEnd * std::abs(best_.value));
+  const bool current_is_met = !repairing_ && !current_.blocked && current_.missed <= kMet;
+  const bool best_is_better =
+      has_best_ && (!current_is_met || best_.value > current_.value + kSameEnd * std::abs(best_.value));
   const Point& point = best_is_better ? best_ : current_;
   ClimbEnd found{point.x, point.value, 0.0, kkt_, status_, values_, evaluations_};
   if (!has_best_) {

@@ -20,9 +20,9 @@ enum class ClimbStatus { converged, stalled, given_up, not_met };
 /// Where a climb ended.
 struct ClimbEnd {
   std::vector<double> x;
-  double value;                ///< of the index
-  double missed;               ///< by how much the requirement that is missed most is; 0 where all are met
-  double kkt;                  ///< residual of the conditions of Karush, Kuhn and Tucker
+  double value;   ///< of the index
+  double missed;  ///< by how much the requirement that is missed most is; 0 where all are met
+  double kkt;     ///< residual of the conditions of Karush, Kuhn and Tucker
   ClimbStatus status;
   std::vector<double> values;  ///< of the index, where the requirements were first met and after each step from there
   int evaluations;             ///< grasps that were looked at
@@ -72,6 +72,7 @@ class Climber {
   enum class Outcome { taken, refused, ended };
 
   bool begin(const double* x);
+  bool gets_nowhere(int steps);
   void linearize(const std::vector<double>& x, const std::vector<double>& Phi, bool index);
   void linearize_current();
   void set_slope();
@@ -89,6 +90,8 @@ class Climber {
   void refuse();
   void shift_cuts(const Vector& w, double gained);
   void add_cuts(const Vector& w);
+  void sample_cuts();
+  bool falls_at_once();
   bool challenged();
   void keep_if_best();
   ClimbEnd end() const;
@@ -105,14 +108,15 @@ class Climber {
   Point current_, trial_, best_;
   std::vector<double> Phi_, trial_Phi_, step_;
   bool has_best_ = false, repairing_ = false, logarithmic_ = false, has_curvature_ = false;
-  double scale_ = 1.0;          // divides the index and its slopes
+  double scale_ = 1.0;  // divides the index and its slopes
   Vector g_, w_, lambda_;
   Rows rows_, old_rows_, index_row_;
   Matrix B_;
   double trust_radius_ = 0.0, penalty_ = 0.0, kkt_ = 0.0, reach_ = 0.0;
+  double missed_before_ = 0.0, best_before_ = 0.0;
   std::vector<Cut> cuts_;
   std::vector<double> values_;
-  int evaluations_ = 0, challenges_ = 0;
+  int evaluations_ = 0, challenges_ = 0, samplings_ = 0;
   ClimbStatus status_ = ClimbStatus::given_up;
 };
 

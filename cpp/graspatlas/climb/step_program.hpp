@@ -21,22 +21,23 @@ struct Cut {
 ///   maximise  v - w' B w / 2 - penalty t
 ///   so that   v <= g . w, and the index's cuts,   c_i + a_i . w + t >= 0,   t >= 0,   |w|_inf <= trust radius
 ///
-/// with the slope g of the index, and the slacks c_i and their slopes a_i. What requirements miss is t, so a step towards
-/// them is found where they cannot be met at once. Where the current grasp meets them t is left out.
+/// with the slope g of the index, and the slacks c_i and their slopes a_i. What requirements miss is t, so a step
+/// towards them is found where they cannot be met at once. Where the current grasp meets them t is left out.
 class StepProgram {
  public:
   explicit StepProgram(int dimension);
 
-  /// B [k x k] positive definite, g [k], rows of slacks, cuts; a penalty of 0 leaves t out. False when rounding defeats the solver.
+  /// B [k x k] positive definite, g [k], rows of slacks, cuts; a penalty of 0 leaves t out. False when rounding defeats
+  /// the solver.
   bool solve(const Matrix& B, const Vector& g, const Rows& slacks, const std::vector<Cut>& cuts, double trust_radius,
              double penalty);
 
   const Vector& w() const { return w_; }
-  double missed() const { return missed_; }               ///< t
-  const Vector& multipliers() const { return lambda_; }   ///< of the slacks [rows]
+  double missed() const { return missed_; }              ///< t
+  const Vector& multipliers() const { return lambda_; }  ///< of the slacks [rows]
   /// g + sum_i lambda_i a_i, with cuts in the place of what they cut: what no requirement holds back of the slope.
   const Vector& left_over() const { return left_over_; }
-  double model_gain() const { return gain_; }             ///< v - w' B w / 2
+  double model_gain() const { return gain_; }  ///< v - w' B w / 2
 
  private:
   int k_;

@@ -14,7 +14,7 @@ constexpr double kGap = 1e-10;     // the margin is found to within this
 constexpr double kGrowth = 12.0;   // of the barrier's weight from one centring to the next
 constexpr double kCentred = 1e-8;  // squared Newton decrement at which a centring ends
 constexpr int kMaxNewtonSteps = 200;
-constexpr int kPolishing = 2;      // more steps, so that multipliers are as exact as the margin
+constexpr int kPolishing = 2;  // more steps, so that multipliers are as exact as the margin
 constexpr double kStartMargin =
     -1.0;  // a barrier starts this far outside the cones, so that it is inside all of its own
 
@@ -221,7 +221,8 @@ bool ForceClosure::newton_step(double weight) {
 }
 
 // L(f, t) = t + sum of (axial multiplier along + tangential multiplier . tangent) over the cones
-//             + equation multipliers . (equations' f - right-hand side); at the centre of the barrier its slope by f is 0.
+//             + equation multipliers . (equations' f - right-hand side); at the centre of the barrier its slope by f is
+//             0.
 void ForceClosure::keep_multipliers() {
   for (int polish = 0; polish < kPolishing; ++polish) {
     newton_direction(weight_);
@@ -241,7 +242,8 @@ void ForceClosure::keep_multipliers() {
     const double s = cones_[static_cast<std::size_t>(c)].evaluate(z_, tangent, along);
     cone_axial_(c) = 2.0 * along / (weight_ * s);
     cone_tangential_.col(c) = (-2.0 / (weight_ * s)) * tangent;
-    slope.segment(c * force_size_, force_size_) = friction_ * cone_axial_(c) * normals_.col(c) + cone_tangential_.col(c);
+    slope.segment(c * force_size_, force_size_) =
+        friction_ * cone_axial_(c) * normals_.col(c) + cone_tangential_.col(c);
   }
   equation_multipliers_ = qr_.solve(-slope);
   equation_multipliers_.array() /= norms_.array();

@@ -96,8 +96,8 @@ class ForceClosure {
   Vector particular_;  // forces with total normal force one that balance the load; without one they are internal
   std::vector<ContactPoint> points_;
 
-  // For `lagrangian`: the last weight of the barrier, what the columns of the equations were divided by, the forces, and
-  // the multipliers of cones and equations.
+  // For `lagrangian`: the last weight of the barrier, what the columns of the equations were divided by, the forces,
+  // and the multipliers of cones and equations.
   double weight_ = 1.0;
   Vector norms_, forces_, cone_axial_, equation_multipliers_;
   Matrix cone_tangential_;

@@ -12,12 +12,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from graspatlas.analysis.objective import BOUND_TOLERANCE, Ends, Objective
-from graspatlas.analysis.unbounded import followed, is_sharp, levels_around, never_levels_off, rises_towards_one_point
+from graspatlas.analysis.unbounded import (
+    Around,
+    followed,
+    is_sharp,
+    levels_around,
+    never_levels_off,
+    rises_towards_one_point,
+)
 from graspatlas.errors import GraspAtlasError
 from graspatlas.result.grasp_atlas import GraspAtlas, check_is_result
 from graspatlas.support.arrays import Array
@@ -51,6 +59,7 @@ class Climb:
             :mod:`graspatlas.analysis.unbounded`.
         kkt: Largest residual of the conditions of Karush, Kuhn and Tucker where it ended, of the logarithm of the index
             [per unit of the tangent space].
+        stalled: True when it ended because no smaller step gained anything, though slopes do not vanish.
     """
 
     chart: int
@@ -59,6 +68,7 @@ class Climb:
     converged: bool
     unbounded: bool = False
     kkt: float = float("nan")
+    stalled: bool = False
 
     def __repr__(self) -> str:
         end = "converged" if self.converged else "given up"
@@ -85,10 +95,10 @@ def climb(
 ) -> Climb:
     """Climb to a local maximum of the index, on the manifold, within its bounds and the result's requirements.
 
-    The compiled core climbs by sequential quadratic programming in the tangent spaces of the grasps that it passes, with
-    bounds and requirements as constraints: see ``cpp/graspatlas/climb/climber.hpp``. It ends where the index has no
-    slope that they do not hold back, and where no grasp of a sample around is better. An index or a requirement that is
-    a function of yours is asked by the core.
+    The compiled core climbs by sequential quadratic programming in the tangent spaces of the grasps that it passes,
+    with bounds and requirements as constraints: see ``cpp/graspatlas/climb/climber.hpp``. It ends where the index has
+    no slope that they do not hold back, and where no grasp of a sample around is better. An index or a requirement that
+    is a function of yours is asked by the core.
 
     Args:
         result: The result; its index may be any callable.
@@ -152,7 +162,15 @@ def climbs_of(objective: Objective, X: Array, charts: Sequence[int], ends: Ends)
         if ends.status[i] != "not met" and objective.meets(ends.x[i : i + 1])[0]:
             qualities = np.concatenate([values[i : i + 1], ends.values[i][1:]])
             qualities[-1] = objective.values(ends.x[i : i + 1])[0]
-            end = Climb(int(chart), ends.x[i], qualities, ends.status[i] == "converged", kkt=float(ends.kkt[i]))
+            status = ends.status[i]
+            end = Climb(
+                int(chart),
+                ends.x[i],
+                qualities,
+                status == "converged",
+                kkt=float(ends.kkt[i]),
+                stalled=status == "stalled",
+            )
         found.append(_judged(objective, end))
     return found
 
@@ -161,14 +179,15 @@ def _judged(objective: Objective, end: Climb) -> Climb:
     """A climb with whether it ran after an index without a maximum: only one that has not converged can have."""
     if end.converged:
         return end
-    levels = levels_around(objective, end.x, end.quality)
+    near = partial(Around, objective)
+    levels = levels_around(near, end.x, end.quality, objective.radius)
     if rises_towards_one_point(levels):
         return replace(end, unbounded=True)
     if is_sharp(levels):
-        x, value = followed(objective, end.x, end.quality)
+        x, value = followed(near, end.x, end.quality, objective.radius)
         if value > end.quality:
             end = replace(end, x=x, qualities=np.append(end.qualities, value))
-            levels = levels_around(objective, x, value)
+            levels = levels_around(near, x, value, objective.radius)
         return replace(end, unbounded=never_levels_off(levels))
     return end
 

@@ -1,10 +1,10 @@
 """A denser grid than the charts' centres, for indices that change abruptly (end of Section IV of the paper).
 
 Each chart's polytope is filled with the points of a cubic lattice of its tangent space, and these are projected to the
-manifold::
+manifold, first in the charts that could hold a better grasp than the best::
 
     samples = ga.densify(result, 0.02)                  # everywhere
-    samples = ga.densify(result, 0.02, share=0.1)       # in the tenth of the charts where the index jumps most
+    samples = ga.densify(result, 0.02, share=0.1)       # in a tenth of the charts: those of result.gap, and large jumps
     samples.best.quality, result.best.quality
 
 How close the samples lie stands in :mod:`graspatlas.atlas.grid`.
@@ -26,12 +26,12 @@ from graspatlas.problem.problem import Problem
 from graspatlas.quality.evaluation import evaluate
 from graspatlas.requirements.screening import screen
 from graspatlas.result.grasp_atlas import GraspAtlas, check_is_result
-from graspatlas.support.arrays import Array, BoolArray
+from graspatlas.support.arrays import Array, BoolArray, IntArray
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.renamed import renamed_attribute
 from graspatlas.support.validation import positive
 
-__all__ = ["Samples", "densify", "jumps"]
+__all__ = ["Samples", "by_promise", "densify", "jumps"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +78,14 @@ class Samples(Grid):
 def densify(result: GraspAtlas, spacing: float, *, share: float = 1.0, progress: bool | None = None) -> Samples:
     """Read the index on a denser grid: inside the polytopes, at a spacing of your choice.
 
-    Everywhere, or where the index changes most from chart to chart: see :func:`jumps`. Ctrl-C keeps what there is.
+    Everywhere, or where it promises most: see :func:`by_promise`. The charts are filled in that order, and Ctrl-C keeps
+    what there is; the samples come by chart.
 
     Args:
         result: The result; its index and its requirements are those of the samples.
         spacing: Distance between lattice points in a tangent space [rad, and lengths in units of
             ``problem.length_scale``]; at a fourth of the radius there are some thirty samples a chart when k = 2.
-        share: Share of the charts to fill, those with the largest jumps; above 0, and 1 for all.
+        share: Share of the charts to fill, those that promise most; above 0, and 1 for all.
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
     Returns:
@@ -99,7 +100,7 @@ def densify(result: GraspAtlas, spacing: float, *, share: float = 1.0, progress:
     check_is_result(result)
     positive(share, "share", most=1.0)
     count = int(np.ceil(share * result.atlas.n_charts))
-    charts = np.sort(np.argsort(-jumps(result), kind="stable")[:count])
+    charts = by_promise(result)[:count]
     done: list[tuple[Grid, Array, BoolArray, dict[str, int]]] = []
     blocks = grid_blocks(result.atlas, spacing, charts, progress)
     complete = True
@@ -112,13 +113,31 @@ def densify(result: GraspAtlas, spacing: float, *, share: float = 1.0, progress:
         complete = False
     finally:
         blocks.close()
+    grid = joined_grid(result.atlas, [block for block, *_ in done], complete)
+    order = np.argsort(grid.charts, kind="stable")
     return Samples(
-        **vars(joined_grid(result.atlas, [block for block, *_ in done], complete)),
+        **{**vars(grid), **{name: getattr(grid, name)[order] for name in ("x", "charts", "u")}},
         problem=result.problem,
-        qualities=np.concatenate([np.zeros(0), *(qualities for _, qualities, _, _ in done)]),
-        accepted=np.concatenate([np.zeros(0, bool), *(accepted for _, _, accepted, _ in done)]),
+        qualities=np.concatenate([np.zeros(0), *(qualities for _, qualities, _, _ in done)])[order],
+        accepted=np.concatenate([np.zeros(0, bool), *(accepted for _, _, accepted, _ in done)])[order],
         rejected={name: sum(rejected[name] for *_, rejected in done) for name in (done[0][-1] if done else ())},
     )
+
+
+def by_promise(result: GraspAtlas) -> IntArray:
+    """All charts, those first where samples between the centres promise most [n].
+
+    First come the charts of ``result.gap`` that could hold a grasp better than the best, the highest bound first; then
+    those with too few neighbours to tell; then the others by how much the index jumps, see :func:`jumps`.
+
+    Args:
+        result: The result.
+    """
+    others = np.argsort(-jumps(result), kind="stable")
+    if not result.accepted.any():
+        return others
+    first = np.concatenate([result.gap.charts, result.gap.unknown])
+    return np.concatenate([first, others[~np.isin(others, first)]])
 
 
 def jumps(result: GraspAtlas) -> Array:

@@ -88,7 +88,7 @@ def lay_grid(
     Source: "Global Optimization of Robotic Grasps", eqs (14) and (15), and the end of Section IV.
     """
     grids: list[Grid] = []
-    blocks = grid_blocks(atlas, spacing, charts, progress)
+    blocks = grid_blocks(atlas, spacing, None if charts is None else np.unique(charts), progress)
     complete = True
     try:
         for block in blocks:
@@ -131,12 +131,13 @@ def _last(high: Array, spacing: float) -> Array:
 
 
 def _checked(atlas: Atlas, spacing: float, charts: Sequence[int] | ArrayLike | None) -> IntArray:
-    """The charts to fill, when the spacing makes sense for them."""
+    """The charts to fill, each once and in the order given, when the spacing makes sense for them."""
     positive(spacing, "spacing")
-    chosen = np.unique(np.arange(atlas.n_charts) if charts is None else np.asarray(charts))
+    chosen = np.asarray(np.arange(atlas.n_charts) if charts is None else charts)
     if len(chosen) == 0:
         return np.zeros(0, np.int64)
-    if chosen.dtype.kind not in "iu" or chosen[0] < 0 or chosen[-1] >= atlas.n_charts:
+    chosen = chosen[np.sort(np.unique(chosen, return_index=True)[1])]
+    if chosen.dtype.kind not in "iu" or chosen.min() < 0 or chosen.max() >= atlas.n_charts:
         raise GraspAtlasError(f"charts must be whole numbers from 0 to {atlas.n_charts - 1}, got {charts!r}")
     most = most_samples(atlas, spacing, chosen)
     if most > MOST_SAMPLES:
@@ -162,7 +163,7 @@ def _spacing_that_fits(atlas: Atlas, spacing: float, charts: IntArray) -> float 
 def grid_blocks(
     atlas: Atlas, spacing: float, charts: Sequence[int] | ArrayLike | None, progress: bool | None
 ) -> Generator[Grid]:
-    """The grid in pieces of about `BLOCK` points, with a progress bar over the charts."""
+    """The grid in pieces of about `BLOCK` points, chart by chart as given, with a progress bar over the charts."""
     chosen = _checked(atlas, spacing, charts)
     bar = progress_bar(f"up to {most_samples(atlas, spacing, chosen):,.0f} samples", "charts", len(chosen), progress)
     low, high = _boxes(atlas)

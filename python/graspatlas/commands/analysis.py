@@ -40,9 +40,7 @@ def add_analysis_commands(commands: Subcommands) -> None:
         "result", type=path_word, help="folder or file that optimize wrote; samples.npz is written beside"
     )
     denser.add_argument("spacing", type=float, metavar="SPACING", help="distance of samples, in the unit of the radius")
-    denser.add_argument(
-        "--share", type=float, default=1.0, metavar="F", help="only the charts where the index jumps most"
-    )
+    denser.add_argument("--share", type=float, default=1.0, metavar="F", help="only the charts that promise most")
     denser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
     denser.set_defaults(run=_densify)
 

@@ -9,6 +9,7 @@ from graspatlas.optimizer.components import Components, SearchStatus
 from graspatlas.quality.batched import quality_name
 from graspatlas.result.refinement import Refinement
 from graspatlas.result.result import Result
+from graspatlas.result.summary import GapSummary
 from graspatlas.support.arrays import Array
 
 __all__ = ["component_lines", "result_lines"]
@@ -55,12 +56,27 @@ def result_lines(result: Result, folder: Path | None) -> list[str]:
     lines += _best_lines(result) if result.accepted.any() else ["  no best grasp: relax a requirement"]
     if result.refinement:
         lines += _refined_lines(result)
+    if summary["gap"]:
+        lines.append(_gap_line(summary["gap"], summary["n_charts"]))
     lines += [f"  better grasps may exist: {doubt}" for doubt in result.atlas.doubts]
     if folder and result.status not in (Status.COMPLETE, Status.BLOCKED):
         lines.append("  run the same command again, with a higher limit if there was one, and it goes on from here")
     if folder:
         lines.append(f"  written to {folder}; look at it with: graspatlas view {folder}")
     return lines
+
+
+def _gap_line(gap: GapSummary, n_charts: int) -> str:
+    """How many charts could hold a better grasp, by the estimate."""
+    line = f"  gap (estimated): {gap['n_charts'] or 'none'} of {n_charts} charts could hold a better grasp"
+    if gap["n_charts"]:
+        more = "" if gap["share"] is None else f" ({100.0 * gap['share']:+.3g} %)"
+        line += f", up to {gap['bound']:.6g}{more}"
+    if gap["n_rejected"]:
+        line += f"; the centres of {gap['n_rejected']} of them are rejected"
+    if gap["n_unknown"]:
+        line += f"; too few neighbours to tell of {gap['n_unknown']} more"
+    return line
 
 
 def _best_lines(result: Result) -> list[str]:

@@ -15,6 +15,8 @@ from graspatlas.atlas.atlas import Atlas
 from graspatlas.atlas.build import grown
 from graspatlas.atlas.limits import LimitOptions, Limits
 from graspatlas.errors import GraspAtlasError
+from graspatlas.multistart.search import SHARE
+from graspatlas.optimizer.all_motions import check_motions, slice_dimension, with_best_of_all
 from graspatlas.optimizer.options import several_indices, with_defaults
 from graspatlas.optimizer.readings import Reading, check_atlas_of
 from graspatlas.problem.problem import Problem
@@ -43,6 +45,9 @@ def optimize(
     require: Sequence[RequirementLike] | None = None,
     refine: bool | str = False,
     refine_steps: int = MAX_STEPS,
+    motions: str = "relevant",
+    share_missing: float = SHARE,
+    seed: int = 0,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: bool | None = None,
     atlas: Atlas | None = None,
@@ -66,6 +71,14 @@ def optimize(
         refine: Climb from the best charts to the maximum between the charts' centres, ``result.refined_best``: in R
             with True or ``"relevant"``, then on in all dimensions of F with ``"feasible"``; see :func:`refine`.
         refine_steps: Steps after which such a climb is given up.
+        motions: ``"all"`` searches the best of all feasible grasps F, no hand motion frozen but the couplings and
+            whatever connected component it lies in: climbs from the best charts, from random grasps, and from charts of
+            slices through these, until little can be missing; ``result.refinement`` holds the maxima, and
+            ``result.refinement.search`` what the search can say. The atlas is then that of the problem's default
+            dimension and radius.
+        share_missing: With all motions, the largest share of climbs that may end at maxima not found; see
+            :class:`graspatlas.SearchReport`.
+        seed: Of the search's random numbers: the same seed finds the same, whatever the number of threads.
         checkpoint: See :func:`build_atlas`.
         progress: See :func:`build_atlas`.
         atlas: An atlas of the same problem and options to read instead of tracing one: that of another result, or the
@@ -86,6 +99,9 @@ def optimize(
     Source: "Global Optimization of Robotic Grasps", Algorithm 1.
     """
     limit = Limits.of(limits, "optimize")
+    check_motions(motions, dimension, refine, share_missing, seed)
+    if motions == "all":
+        dimension = slice_dimension(problem)
     options = with_defaults(problem, dimension=dimension, radius=radius, epsilon=epsilon, quality=quality)
     if refine not in (False, True, "relevant", "feasible"):
         raise GraspAtlasError(f"refine must be True, False, 'relevant' or 'feasible', got {refine!r}")
@@ -103,6 +119,17 @@ def optimize(
         check_atlas_of(problem, options, atlas)
     with keeping(atlas=atlas):
         result = reading.at(problem, atlas)
+        if motions == "all":
+            with keeping(result=result):
+                return with_best_of_all(
+                    result,
+                    share=share_missing,
+                    seed=seed,
+                    max_steps=refine_steps,
+                    max_seconds=seconds_until(limit.deadline, _SHORTEST) if np.isfinite(limit.deadline) else None,
+                    checkpoint=checkpoint,
+                    progress=progress,
+                )
         if refine and result.accepted.any() and not stopping():
             with keeping(result=result):
                 found = climb_peaks(

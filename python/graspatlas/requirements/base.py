@@ -53,7 +53,6 @@ class Requirement(StatedRequirement):
         """
         return None
 
-
     def measures(self, problem: Problem, system: _core.GraspSystem) -> list[_core.Measure]:
         """What a climb in the compiled core follows: the slacks, and whether the requirement is met.
 
@@ -113,6 +112,8 @@ def requirement_measures(
     """
     measures: list[_core.Measure] = []
     for requirement in requirements:
-        named = isinstance(requirement, Requirement)
-        measures += requirement.measures(problem, system) if named else tested(requirement, problem, system)
+        if isinstance(requirement, Requirement):
+            measures += requirement.measures(problem, system)
+        else:
+            measures += tested(requirement, problem, system)
     return measures

@@ -18,11 +18,11 @@ from graspatlas.quality.batched import quality_name
 from graspatlas.requirements.base import RequirementLike, requirement_name
 from graspatlas.requirements.lost import Lost
 from graspatlas.result.grasp_atlas import GraspAtlas
-from graspatlas.result.refinement import Refinement
+from graspatlas.result.refinement import Refinement, SearchEnd, SearchReport
 from graspatlas.support.archives import DamagedArchive, read_arrays
 from graspatlas.support.arrays import AnyArray, Array, BoolArray
 from graspatlas.support.files import is_folder, opened, replaced, stated_path
-from graspatlas.support.validation import StatedTable, number, shown
+from graspatlas.support.validation import StatedTable, number, shown, whole
 
 __all__ = ["read_result", "save_result"]
 
@@ -32,7 +32,9 @@ FORMAT_VERSION = 2
 UNIT_TOLERANCE = 1e-6
 
 _REFINEMENT_FLAGS = ("all_motions", "complete")
-_REFINEMENT_ARRAYS = tuple(f.name for f in fields(Refinement) if f.name not in _REFINEMENT_FLAGS)
+#: Arrays that files of version 0.1 do not hold, and what stands for each of their numbers.
+_NEW_ARRAYS = {"stalled": False, "kkt": np.nan, "hits": 1}
+_REFINEMENT_ARRAYS = tuple(f.name for f in fields(Refinement) if f.name not in (*_REFINEMENT_FLAGS, "search"))
 
 
 class Parts(TypedDict):
@@ -79,7 +81,9 @@ def save_result(result: GraspAtlas, path: str | os.PathLike[str]) -> None:
     }
     extra: dict[str, AnyArray] = {f"other_{i}": values for i, values in enumerate(result.others.values())}
     if result.refinement is not None:
-        header["refinement"] = {name: getattr(result.refinement, name) for name in _REFINEMENT_FLAGS}
+        flags = {name: getattr(result.refinement, name) for name in _REFINEMENT_FLAGS}
+        search = result.refinement.search
+        header["refinement"] = flags if search is None else {**flags, "search": asdict(search)}
         extra |= {f"refined_{name}": getattr(result.refinement, name) for name in _REFINEMENT_ARRAYS}
     arrays: dict[str, Any] = {"qualities": result.qualities, "accepted": result.accepted, **extra}
     arrays |= result.atlas.to_arrays()
@@ -237,19 +241,42 @@ def _refinement(flags: StatedTable | None, arrays: dict[str, AnyArray], problem:
     """The refinement of a result file, taken out of its arrays."""
     if flags is None:
         return None
+    p = len(arrays["refined_x"])
+    for name, stand_in in _NEW_ARRAYS.items():
+        arrays.setdefault(f"refined_{name}", np.full(p, stand_in))
     parts = {name: arrays.pop(f"refined_{name}") for name in _REFINEMENT_ARRAYS}
-    p = len(parts["x"])
-    kinds = {"x": "f", "qualities": "f", "starts": "i", "converged": "b", "unbounded": "b", "steps": "i"}
+    kinds = {**dict.fromkeys(("x", "qualities", "kkt"), "f"), **dict.fromkeys(("starts", "steps", "hits"), "i")}
+    kinds |= dict.fromkeys(("converged", "stalled", "unbounded"), "b")
     shapes = {**dict.fromkeys(kinds, (p,)), "x": (p, problem.full_system.configuration_size)}
     for name, array in parts.items():
         if p == 0 or array.shape != shapes[name] or array.dtype.kind != kinds[name] or not _sound(name, array):
             raise GraspAtlasError(f"the refined {name} have shape {array.shape} and type {array.dtype}")
     check_configurations(problem, parts["x"], "refined grasp")
-    return Refinement(**parts, all_motions=bool(flags["all_motions"]), complete=bool(flags["complete"]))
+    search = flags.get("search")
+    return Refinement(
+        **parts,
+        all_motions=bool(flags["all_motions"]),
+        complete=bool(flags["complete"]),
+        search=None if search is None else _search_report(search),
+    )
+
+
+def _search_report(stated: StatedTable) -> SearchReport:
+    """The report of a search, each number of its type."""
+    values = {name: stated[name] for name in (f.name for f in fields(SearchReport))}
+    counts = ("rounds", "climbs", "met", "peaks", "best_hits", "tries", "seed")
+    return SearchReport(
+        status=SearchEnd(values.pop("status")),
+        share_missing=number(values.pop("share_missing"), "share_missing"),
+        seconds=number(values.pop("seconds"), "seconds"),
+        **{name: whole(values[name], name, 0) for name in counts},
+    )
 
 
 def _sound(name: str, array: AnyArray) -> bool:
     """Whether all numbers are finite; qualities that run away may be infinite."""
+    if name == "kkt":
+        return True  # not known where a climb had no slope
     return bool((~np.isnan(array) if name == "qualities" else np.isfinite(array)).all())
 
 

@@ -21,6 +21,7 @@ from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.quality.evaluation import evaluate
 from graspatlas.requirements.base import RequirementLike
 from graspatlas.requirements.screening import screen
+from graspatlas.result.gap import Gap, estimate_gap
 from graspatlas.result.refinement import Refinement
 from graspatlas.support.arrays import Array, BoolArray, IndexArray
 from graspatlas.support.pickling import Light
@@ -170,8 +171,27 @@ class GraspAtlas(Light):
 
     @property
     def gain(self) -> float:
-        """By how much the refined best is better than the best chart, as a share of the latter's quality."""
+        """By how much the refined best is better than the best chart, as a share of the latter's quality.
+
+        Infinite where no chart meets the requirements.
+        """
+        if not self.accepted.any():
+            return float("inf")
         return (self.refined_best.quality - self.best.quality) / max(abs(self.best.quality), 1e-300)
+
+    @cached_property
+    def gap(self) -> Gap:
+        """Which charts could still hold a grasp better than the refined best, or than the best chart: an estimate.
+
+        It is estimated from the index at neighbouring charts, and not proved. Where the refinement ran after an index
+        that grows without bound there is no best to compare with, and the best chart stands in for it.
+
+        Raises:
+            GraspAtlasError: If no grasp meets the requirements.
+        """
+        refined = self.refinement is not None and not self.refinement.unbounded[0]
+        best = self.refined_best if refined else self.best
+        return estimate_gap(self.atlas, self.qualities, self.accepted, best.quality)
 
     def values(self, quality: Quality) -> Array:
         """Value of any index at each chart centre [n].

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from graspatlas.atlas.verification import CheckReport
 from graspatlas.grasps.columns import grasp_columns, parameter_columns
@@ -15,7 +18,14 @@ from graspatlas.quality.batched import quality_name
 from graspatlas.result.exports import Choice, save_grasps
 from graspatlas.result.files import read_result, save_result
 from graspatlas.result.grasp_atlas import GraspAtlas
-from graspatlas.result.summary import GraspSummary, OtherSummary, RefinementSummary, ResultSummary
+from graspatlas.result.summary import (
+    GapSummary,
+    GraspSummary,
+    OtherSummary,
+    PeakSummary,
+    RefinementSummary,
+    ResultSummary,
+)
 from graspatlas.result.verification import check_result
 from graspatlas.support.columns import joined, to_frame
 from graspatlas.support.renamed import renamed_keyword
@@ -24,6 +34,9 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 __all__ = ["Result", "load_result"]
+
+#: Places at which climbs ended that a summary lists, the best first.
+MOST_PEAKS = 20
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -126,6 +139,7 @@ class Result(GraspAtlas):
                 "at_x1": float(self.qualities[0]),
             },
             "best": _summary_of_grasp(best) if best else None,
+            "gap": self._summary_of_gap(),
         }
         if self.others:
             summary["others"] = self._summary_of_others(best)
@@ -143,15 +157,42 @@ class Result(GraspAtlas):
                 out[name]["largest"] = float(left.max())
         return out
 
+    def _summary_of_gap(self) -> GapSummary | None:
+        """The gap; None where there is no best to compare with."""
+        runs_away = self.refinement is not None and bool(self.refinement.unbounded[0])
+        if runs_away or not self.accepted.any():
+            return None
+        gap = self.gap
+        return {
+            "kind": "estimated",
+            "n_charts": gap.n_charts,
+            "n_rejected": gap.n_rejected,
+            "n_unknown": len(gap.unknown),
+            "best": gap.best,
+            "bound": gap.bound,
+            "share": gap.share if np.isfinite(gap.share) else None,
+        }
+
     def _summary_of_refinement(self) -> RefinementSummary:
         best, refinement = self.refined_best, self.refinement
         assert refinement is not None
-        return {
+        search = refinement.search
+        peaks: list[PeakSummary] = [
+            {"quality": float(quality), "status": str(status), "hits": int(hits), "kkt": _finite(kkt)}
+            for quality, status, hits, kkt in zip(
+                refinement.qualities, refinement.statuses, refinement.hits, refinement.kkt, strict=True
+            )
+        ]
+        summary: RefinementSummary = {
             "quality": best.quality,
-            "gain": None if refinement.unbounded[0] else self.gain,
+            "gain": None if refinement.unbounded[0] or not self.accepted.any() else self.gain,
             "status": str(refinement.statuses[0]),
             "converged": bool(refinement.converged[0]),
             "steps": int(refinement.steps[0]),
+            "kkt": _finite(refinement.kkt[0]),
+            "starts": search.climbs if search else int(refinement.hits.sum()),
+            "share_missing": search.share_missing if search else None,
+            "peaks": peaks[:MOST_PEAKS],
             "n_peaks": refinement.n_peaks,
             "n_unbounded": int(refinement.unbounded.sum()),
             "advice": refinement.advice,
@@ -161,6 +202,20 @@ class Result(GraspAtlas):
             "object_xyz": best.object_xyz.tolist(),
             "object_quat_xyzw": best.object_quat_xyzw.tolist(),
         }
+        if search:
+            summary["search"] = {
+                "status": str(search.status),
+                "rounds": search.rounds,
+                "climbs": search.climbs,
+                "met": search.met,
+                "peaks": search.peaks,
+                "best_hits": search.best_hits,
+                "share_missing": search.share_missing,
+                "tries": search.tries,
+                "seed": search.seed,
+                "seconds": search.seconds,
+            }
+        return summary
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the result to one file, which :func:`load_result` reads; an existing file is replaced at once or not.
@@ -172,6 +227,10 @@ class Result(GraspAtlas):
             GraspAtlasError: If the file cannot be written.
         """
         save_result(self, path)
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
 
 
 def _summary_of_grasp(grasp: Grasp) -> GraspSummary:

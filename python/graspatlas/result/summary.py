@@ -8,6 +8,7 @@ from typing_extensions import NotRequired
 
 __all__ = [
     "AuditSummary",
+    "GapSummary",
     "GraspSummary",
     "OtherSummary",
     "QualitySummary",
@@ -43,6 +44,18 @@ class QualitySummary(TypedDict):
     at_x1: float
 
 
+class GapSummary(TypedDict):
+    """The charts that could hold a better grasp, estimated; no share of a best that is 0."""
+
+    kind: str
+    n_charts: int
+    n_rejected: int
+    n_unknown: int
+    best: float
+    bound: float
+    share: float | None
+
+
 class GraspSummary(TypedDict):
     """A chart's grasp."""
 
@@ -59,14 +72,43 @@ class OtherSummary(TypedDict):
     largest: NotRequired[float]
 
 
+class PeakSummary(TypedDict):
+    """A place at which climbs ended; kkt is None where it is not known."""
+
+    quality: float
+    status: str
+    hits: int
+    kkt: float | None
+
+
+class SearchSummary(TypedDict):
+    """What a search over all feasible grasps did; see :class:`graspatlas.SearchReport`."""
+
+    status: str
+    rounds: int
+    climbs: int
+    met: int
+    peaks: int
+    best_hits: int
+    share_missing: float
+    tries: int
+    seed: int
+    seconds: float
+
+
 class RefinementSummary(TypedDict):
-    """The best of the refined maxima; no gain where the index grows without bound."""
+    """The best of the refined maxima; no gain where the index grows without bound, or no chart is accepted."""
 
     quality: float
     gain: float | None
     status: str
     converged: bool
     steps: int
+    kkt: float | None
+    starts: int
+    share_missing: float | None
+    peaks: list[PeakSummary]
+    search: NotRequired[SearchSummary]
     n_peaks: int
     n_unbounded: int
     advice: str
@@ -78,7 +120,10 @@ class RefinementSummary(TypedDict):
 
 
 class ResultSummary(TypedDict):
-    """A result in plain data; best is None where no grasp meets the requirements."""
+    """A result in plain data; best is None where no grasp meets the requirements, and then the gap is, too.
+
+    The gap is also None where the index grows without bound, so that there is no best.
+    """
 
     problem: str
     dimension: int
@@ -95,5 +140,6 @@ class ResultSummary(TypedDict):
     max_residual: float
     quality: QualitySummary
     best: GraspSummary | None
+    gap: GapSummary | None
     others: NotRequired[dict[str, OtherSummary]]
     refined: NotRequired[RefinementSummary]

@@ -23,6 +23,8 @@ __all__ = ["check_result"]
 
 #: How far a point of the manifold may lie from the nearest polytope, as a share of the chart radius.
 COVERAGE_TOLERANCE = 0.5
+#: Largest residual of the optimality conditions of a grasp that is called a maximum.
+KKT_TOLERANCE = 1e-6
 
 
 def check_result(result: GraspAtlas) -> CheckReport:
@@ -111,8 +113,11 @@ def _refinement_checks(result: GraspAtlas, refinement: Refinement) -> Iterator[C
             error = np.abs(again - refinement.qualities) / np.maximum(np.abs(again), 1e-12)
         error[again == refinement.qualities] = 0.0  # both may be infinite
         yield Check("refined qualities differ from a new evaluation by, relatively", float(error.max()), 1e-6)
-    best, top = result.best.quality, float(refinement.qualities.max())
-    loss = 0.0 if best == top else best - top
-    yield Check("the refined best is worse than the best chart by", loss, 0.0)
+    if result.accepted.any():
+        best, top = result.best.quality, float(refinement.qualities.max())
+        loss = 0.0 if best == top else best - top
+        yield Check("the refined best is worse than the best chart by", loss, 0.0)
+    largest = float(np.nan_to_num(refinement.kkt[refinement.converged]).max(initial=0.0))
+    yield Check("largest residual of the optimality conditions at a maximum", largest, KKT_TOLERANCE)
     met, _ = screen(kept(result.requirements), grasps)
     yield Check("refined grasps that fail a requirement", float((~met).sum()), 0.0)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,12 +20,11 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.problem import Problem
 from graspatlas.search.random_starts import Starts
 from graspatlas.search.starts_near_guess import starts_near
-from graspatlas.support.arrays import Array
+from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.support.deadlines import deadline_after
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.progress import progress_bar
 from graspatlas.support.validation import whole
-from graspatlas.systems.projection import project
 
 __all__ = ["MAX_TRIES", "GraspSearch", "find_grasps", "with_first_grasp"]
 
@@ -131,7 +131,7 @@ class GraspSearch:
         GraspAtlasError: If the problem has no such dimension, or the reference leaves the hand no posture.
     """
 
-    def __init__(self, problem: Problem, dimension: int, seed: int) -> None:
+    def __init__(self, problem: Problem, dimension: int, seed: int | Sequence[int]) -> None:
         self.system = problem.system(dimension)
         # Where all feasible grasps are sought the reference is but the middle of the postures that are drawn.
         frozen = problem.frozen_motions(dimension) > 0
@@ -178,19 +178,30 @@ class GraspSearch:
 
     def attempt(self) -> Array | None:
         """One try: a feasible grasp (size of x,), or None."""
-        self.tries += 1
         # The first grasp only: what is found later must tell of all grasps, not of those near the guess.
         start = next(self._near_guess, None) if self.found == 0 else None
-        x = project(self.system, self._starts.draw(self._rng) if start is None else start)
-        if x is None or not self._starts.has_posture_of(x) or not self._opposed(x):
-            return None
-        self.found += 1
-        return x
+        found = self._tried((self._starts.draw(self._rng) if start is None else start)[None])
+        return found[0] if len(found) else None
 
-    def _opposed(self, x: Array) -> bool:
-        """True when the normals oppose; the equations let them be parallel too."""
-        arrays = self.system.grasp_arrays(x[None])
-        return bool(np.einsum("mc,mc->m", arrays["hand_normals"][0], arrays["object_normals"][0]).max() < 0.0)
+    def attempts(self, count: int) -> Array:
+        """So many tries at random, on all cores: the feasible grasps that they gave (n, size of x)."""
+        return self._tried(np.array([self._starts.draw(self._rng) for _ in range(count)]))
+
+    def _tried(self, starts: Array) -> Array:
+        """The feasible grasps to which starts lead."""
+        self.tries += len(starts)
+        projected, there = _core.project_far(self.system, starts)
+        X: Array = np.asarray(projected)[np.asarray(there)]
+        X = X[[self._starts.has_posture_of(x) for x in X]] if len(X) else X
+        X = X[self._opposed(X)] if len(X) else X
+        self.found += len(X)
+        return X
+
+    def _opposed(self, X: Array) -> BoolArray:
+        """Where the normals oppose (n,); the equations let them be parallel too."""
+        arrays = self.system.grasp_arrays(X)
+        dots = np.einsum("nmc,nmc->nm", arrays["hand_normals"], arrays["object_normals"])
+        return np.asarray(dots.max(axis=1) < 0.0)
 
     def failure(self) -> GraspAtlasError:
         """What to say when no grasp was found."""

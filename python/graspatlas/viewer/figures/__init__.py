@@ -8,6 +8,7 @@ from graspatlas.viewer.figures.ellipse import plot_ellipsoid
 from graspatlas.viewer.figures.extremes import plot_best_and_worst
 from graspatlas.viewer.figures.holding import plot_holding
 from graspatlas.viewer.figures.indices import plot_planar_indices
+from graspatlas.viewer.figures.ladder import plot_ladder
 from graspatlas.viewer.figures.maxima import plot_climbs, plot_local_maxima
 from graspatlas.viewer.figures.pareto import plot_pareto
 from graspatlas.viewer.figures.planar import plot_planar_grasp
@@ -22,6 +23,7 @@ __all__ = [
     "plot_ellipsoid",
     "plot_growth",
     "plot_holding",
+    "plot_ladder",
     "plot_local_maxima",
     "plot_pareto",
     "plot_planar_grasp",

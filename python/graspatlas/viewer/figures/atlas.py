@@ -18,9 +18,9 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.quality.batched import quality_name
 from graspatlas.result.result import Result
 from graspatlas.support.arrays import Array
+from graspatlas.viewer.figures.drawing.surface import Place, View, add_axes, add_polygons, quality_colours, scale_of
 from graspatlas.viewer.figures.polygons import Coordinates, chart_polygons, default_coordinates, open_charts
 from graspatlas.viewer.figures.style import BLUE, INK, PAGE, RED, REJECTED, SINGULAR, Picture, styled
-from graspatlas.viewer.figures.surface import Place, View, add_axes, add_polygons, quality_colours, scale_of
 
 __all__ = ["VIEWS", "AtlasDrawing", "plot_atlas", "plot_growth"]
 
@@ -76,7 +76,7 @@ class AtlasDrawing:
         return array
 
     def draw(self, figure: Figure, place: Place, view: View) -> Axes3D:
-        """Draw the atlas into new axes of a figure; see :func:`graspatlas.viewer.figures.surface.add_axes`."""
+        """Draw the atlas into new axes of a figure; see :func:`graspatlas.viewer.figures.drawing.surface.add_axes`."""
         points = np.concatenate(self.polygons) if self.polygons else self.centers
         axes = add_axes(figure, place, self.coordinates, points, view)
         colours: Array | str = BLUE

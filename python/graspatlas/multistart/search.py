@@ -1,0 +1,236 @@
+"""The search over all feasible grasps: rounds of climbs until little can be missing, or there is no maximum."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import numpy as np
+
+from graspatlas.analysis.objective import Objective
+from graspatlas.analysis.unbounded import Around, levels_around, never_levels_off, rises_towards_one_point
+from graspatlas.errors import GraspAtlasError
+from graspatlas.multistart.census import Census, FoundPeak
+from graspatlas.multistart.checkpoint import RoundFolder
+from graspatlas.multistart.rounds import FIRST_STEP, Plan, Round, RoundKind, climbed, run_round
+from graspatlas.requirements.base import requirement_name
+from graspatlas.result.refinement import Refinement, SearchEnd, SearchReport
+from graspatlas.support.arrays import Array
+from graspatlas.support.deadlines import deadline_after
+from graspatlas.support.interrupts import held, stopping
+from graspatlas.support.progress import progress_bar
+
+__all__ = ["MOST_ROUNDS", "SHARE", "Search", "Source", "nothing_meets", "one_by_one"]
+
+#: Rounds after which a search ends.
+MOST_ROUNDS = 150
+#: A search ends when climbs such as these end at maxima not found yet with less than this chance, and so many have
+#: ended at the best, in at least so many rounds.
+SHARE, BEST_HITS, LEAST_ROUNDS = 0.01, 3, 3
+#: Rounds without a grasp that meets the requirements after which none is expected.
+EMPTY_ROUNDS = 40
+#: Climbs from around a maximum that has not converged.
+POLISH_CLIMBS = 8
+
+#: Yields the rounds of a plan from a number on, in their order, until it is closed.
+Source = Callable[[Plan, int, float], Iterator[Round]]
+
+
+def one_by_one(plan: Plan, first: int, deadline: float) -> Iterator[Round]:
+    """The rounds of a plan in this process, each on all cores; see :data:`Source`."""
+    for number in range(first, MOST_ROUNDS + 1):
+        left = deadline - time.perf_counter()
+        yield run_round(plan, number, None if left == float("inf") else max(left, 1e-3))
+
+
+class Search:
+    """A search over all feasible grasps.
+
+    Attributes:
+        plan: What is maximised.
+        census: What it has found.
+
+    Args:
+        plan: What is maximised.
+        share: The search ends when the expected share of climbs that end at maxima not found yet is at most this; see
+            :class:`graspatlas.SearchReport`.
+        checkpoint: Folder that keeps the rounds; a search that is begun again goes on after the last.
+        progress: Show a progress bar on standard error; by default when it is a terminal.
+    """
+
+    def __init__(
+        self, plan: Plan, share: float, checkpoint: str | os.PathLike[str] | None, progress: bool | None
+    ) -> None:
+        self.plan, self.share, self.progress = plan, share, progress
+        self.objective = plan.objective
+        self.census = Census(self.objective.system.embed)
+        self.folder = None if checkpoint is None else RoundFolder(checkpoint, plan)
+        self.rounds = 0
+        self._bounded: dict[int, bool] = {}
+
+    def run(self, starts: Array, max_seconds: float | None, source: Source = one_by_one) -> Refinement | None:
+        """The local maxima of the index over all feasible grasps that climbs from many starts find.
+
+        Ctrl-C ends it and keeps what was found.
+
+        Args:
+            starts: Grasps to start from before all others [n, configuration_size], such as the best of an atlas.
+            max_seconds: Time after which it ends; None for none.
+            source: Where the rounds are done.
+
+        Returns:
+            What was found, the best first; None where no climb met the requirements, see :func:`nothing_meets`.
+
+        Raises:
+            GraspAtlasError: If the checkpoint is of another search or cannot be read or written.
+        """
+        start = time.perf_counter()
+        deadline = deadline_after(max_seconds)
+        status = SearchEnd.ROUNDS
+        bar = progress_bar("search", "climbs", progress=self.progress)
+        try:
+            for kept in self.folder.load() if self.folder else ():
+                self._count(kept)
+            if self.rounds == 0:
+                left = None if max_seconds is None else max(deadline - time.perf_counter(), 1e-3)
+                self._keep(climbed(self.plan, self.objective, 0, RoundKind.STATED, starts, 0, 0, start, left))
+            bar.update(self.census.climbs)
+            rounds = source(self.plan, self.rounds, deadline)
+            while True:
+                ended = self._ended(deadline)
+                if ended is not None:
+                    status = ended
+                    break
+                new = next(rounds, None)
+                if new is None:
+                    break
+                self._keep(new)
+                bar.update(len(new.x))
+                self._tell(bar.set_postfix_str)
+        except KeyboardInterrupt:
+            status = SearchEnd.INTERRUPTED
+        finally:
+            with held():
+                bar.close()
+        with held():
+            return self._refinement(status, time.perf_counter() - start)
+
+    def _keep(self, new: Round) -> None:
+        if self.folder:
+            with held():
+                self.folder.write(new)
+        self._count(new)
+
+    def _count(self, new: Round) -> None:
+        self.census.add(new)
+        self.rounds = new.number + 1
+
+    def _tell(self, show: Callable[..., None]) -> None:
+        best = self.census.best
+        if best is None:
+            show("none meets the requirements yet", refresh=False)
+        else:
+            missing = f"{self.census.share_missing:.1%} may be missing"
+            show(f"best {best.value:.6g}, {len(self.census.peaks)} maxima, {missing}", refresh=False)
+
+    def _ended(self, deadline: float) -> SearchEnd | None:
+        """Why the search ends here; None where it goes on."""
+        if stopping():
+            return SearchEnd.INTERRUPTED
+        if time.perf_counter() >= deadline:
+            return SearchEnd.TIME_LIMIT
+        best = self.census.best
+        if best is None:
+            return SearchEnd.ROUNDS if self.rounds > EMPTY_ROUNDS else None
+        if self.rounds <= LEAST_ROUNDS:
+            return None
+        if not best.converged and self._unbounded(best):
+            return SearchEnd.UNBOUNDED
+        enough = self.census.share_missing <= self.share and best.hits >= BEST_HITS
+        return SearchEnd.ENOUGH if enough else None
+
+    def _unbounded(self, peak: FoundPeak) -> bool:
+        """Whether the index grows without bound where climbs ended that have not converged."""
+        if id(peak.x) not in self._bounded:
+            levels = levels_around(partial(Around, self.objective), peak.x, peak.value, FIRST_STEP)
+            self._bounded[id(peak.x)] = not (rises_towards_one_point(levels) or never_levels_off(levels))
+        return not self._bounded[id(peak.x)]
+
+    def _refinement(self, status: SearchEnd, seconds: float) -> Refinement | None:
+        """What was found; None where nothing was."""
+        census = self.census
+        if not census.peaks:
+            return None
+        if status is not SearchEnd.INTERRUPTED:
+            self._polish()
+        peaks = census.ranked()
+        unbounded = [not peak.converged and self._unbounded(peak) for peak in peaks]
+        report = SearchReport(
+            status=status,
+            rounds=self.rounds,
+            climbs=census.climbs,
+            met=census.met,
+            peaks=len(peaks),
+            best_hits=peaks[0].hits,
+            share_missing=census.share_missing,
+            tries=census.tries,
+            seed=self.plan.seed,
+            seconds=seconds,
+        )
+        return Refinement(
+            x=np.array([peak.x for peak in peaks]),
+            qualities=np.array([peak.value for peak in peaks]),
+            starts=np.full(len(peaks), -1, np.int64),
+            converged=np.array([peak.converged for peak in peaks], bool),
+            stalled=np.array(
+                [not (peak.converged or runs_away) for peak, runs_away in zip(peaks, unbounded, strict=True)], bool
+            ),
+            unbounded=np.array(unbounded, bool),
+            steps=np.zeros(len(peaks), np.int64),
+            kkt=np.array([peak.kkt for peak in peaks]),
+            hits=np.array([peak.hits for peak in peaks], np.int64),
+            all_motions=True,
+            complete=status in (SearchEnd.ENOUGH, SearchEnd.UNBOUNDED),
+            search=report,
+        )
+
+    def _polish(self) -> None:
+        """Climb again from around the highest place where it has not converged, so that its residual tells more."""
+        best = self.census.best
+        if best is None or best.converged or self._unbounded(best):
+            return
+        rng = np.random.default_rng(self.plan.seed)
+        system = self.objective.system
+        steps = rng.normal(size=(POLISH_CLIMBS, system.tangent_size))
+        steps *= 0.1 * FIRST_STEP / np.linalg.norm(steps, axis=1, keepdims=True)
+        near = np.array([best.x, *(system.integrate(best.x, step) for step in steps)])
+        again = climbed(self.plan, self.objective, -1, RoundKind.STATED, near, 0, 0, time.perf_counter(), None)
+        for i in np.flatnonzero(again.converged):
+            if again.value[i] >= best.value * (1.0 - 1e-6):
+                best.x, best.value = again.x[i], float(again.value[i])
+                best.kkt, best.converged = float(again.kkt[i]), True
+                return
+
+
+def nothing_meets(plan: Plan, census: Census) -> GraspAtlasError:
+    """What to say where no climb met the requirements: which of them the nearest end misses, and by how much."""
+    objective = plan.objective
+    said = "no climb found a grasp at all"
+    if census.least_missed is not None:
+        x = census.least_missed[1][None]
+        parts = []
+        for requirement in plan.requirements:
+            alone = Objective(plan.problem, objective.system, plan.quality, (requirement,), FIRST_STEP)
+            if not alone.meets(x)[0]:
+                by = float(alone.missed(x)[0])
+                parts.append(
+                    f"{requirement_name(requirement)} by {by:.3g}" if np.isfinite(by) else requirement_name(requirement)
+                )
+        said = "the nearest misses " + (" and ".join(parts) or f"a bound by {census.least_missed[0]:.3g}")
+    return GraspAtlasError(
+        f"no feasible grasp of problem '{plan.problem.name}' that meets the requirements was found in {census.climbs} "
+        f"climbs from {census.tries} random starts: {said} (of force closure in units of its margin, of distances in "
+        "units of length_scale, of joints in radians); relax it, or search longer"
+    )
