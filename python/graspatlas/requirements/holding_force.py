@@ -18,8 +18,8 @@ from graspatlas.support.arrays import Array, BoolArray
 
 __all__ = ["HoldingForce"]
 
-#: Relative difference from the largest force up to which grasps are screened, before those in doubt are looked at again;
-#: they are never thought too strong.
+#: Relative difference from the largest force up to which grasps are screened, before those in doubt are looked at
+#: again; they are never thought too strong.
 SCREENING_GAP = 0.01
 
 
@@ -59,7 +59,7 @@ class HoldingForce(Requirement):
         return ":".join([self.name, *(f"{value:g}" for value in values)])
 
     def met(self, grasps: Grasps) -> BoolArray:
-        """Whether each grasp meets the requirement (n,), one that exceeds it by less than 1 part in 100,000 perhaps not."""
+        """Whether each grasp meets the requirement (n,), one that exceeds it by less than 1e-5 of it perhaps not."""
         forces = self._forces(grasps, SCREENING_GAP)
         doubtful = (forces < self.at_least) & (forces >= (1.0 - 2.0 * SCREENING_GAP) * self.at_least)
         if doubtful.any():
