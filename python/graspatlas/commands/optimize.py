@@ -13,6 +13,7 @@ from graspatlas.atlas.status import Status
 from graspatlas.commands.arguments import Subcommands, path_word
 from graspatlas.commands.exit_status import FAILED, INTERRUPTED
 from graspatlas.commands.report import component_lines, result_lines
+from graspatlas.errors import GraspAtlasError
 from graspatlas.optimizer.components import Components, SearchStatus, find_components
 from graspatlas.optimizer.optimize import optimize
 from graspatlas.problem.requirement import parse_requirement
@@ -89,6 +90,8 @@ def _add_limits(best: argparse.ArgumentParser) -> None:
         help="search for other connected components too, and take the best grasp over all of them; --max-seconds then "
         "limits the whole search",
     )
+    best.add_argument("--workers", type=int, metavar="N", help="with --motions all: processes that share the search")
+    best.add_argument("--scheduler", metavar="ADDRESS", help="the same on the workers of a Dask scheduler")
     best.add_argument("--threads", type=int, metavar="N", help="threads to use, all cores by default; same result")
 
 
@@ -109,9 +112,12 @@ def _optimize(options: argparse.Namespace) -> int:
     )
     given = {name: getattr(options, name) for name in names}
     if options.components:
+        if options.workers is not None or options.scheduler is not None:
+            raise GraspAtlasError("components are searched in this process: leave --workers and --scheduler out")
         return _report_components(find_components(problem, **given, require=require, progress=True), options, folder)
     checkpoint = folder / "checkpoint" if folder else None
-    result = optimize(problem, **given, require=require, checkpoint=checkpoint, progress=True)
+    where = {"workers": options.workers, "scheduler": options.scheduler}
+    result = optimize(problem, **given, **where, require=require, checkpoint=checkpoint, progress=True)
     if folder:
         result.save(folder / "result.npz")
         _write_json(result.summary(), folder / "summary.json")
