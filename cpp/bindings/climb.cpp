@@ -11,8 +11,10 @@
 
 #include "bindings.hpp"
 #include "graspatlas/climb/climb_batch.hpp"
+#include "graspatlas/climb/holding_measures.hpp"
 #include "graspatlas/climb/index_measures.hpp"
 #include "graspatlas/climb/requirement_measures.hpp"
+#include "graspatlas/climb/wrench_measures.hpp"
 #include "graspatlas/clock.hpp"
 #include "graspatlas/collision/collision_batch.hpp"
 #include "graspatlas/errors.hpp"
@@ -90,6 +92,25 @@ MeasureRecipe closure_recipe(double friction, double torsional, double margin) {
 
 MeasureRecipe closure_index_recipe(double friction) {
   return closure_recipe(friction, 0.0, -kInside);  // no margin at all
+}
+
+MeasureRecipe holding_recipe(const HoldingLimits& limits, double at_least) {
+  return {[=](GraspSystem& system) { return std::make_unique<HoldingMeasure>(system, limits, at_least); }};
+}
+
+MeasureRecipe holding_index_recipe(const HoldingLimits& limits) {
+  return {[=](GraspSystem& system) { return std::make_unique<HoldingIndex>(system, limits); }};
+}
+
+MeasureRecipe epsilon_recipe(double friction, int edges, double torsional, double length) {
+  return {[pyramids = Pyramids{friction, edges, torsional, length}](GraspSystem& system) -> std::unique_ptr<Measure> {
+    if (system.object_joint().space_dimension() == 2) return std::make_unique<EpsilonMeasure<3>>(system, pyramids);
+    return std::make_unique<EpsilonMeasure<6>>(system, pyramids);
+  }};
+}
+
+MeasureRecipe centrality_recipe(int joints) {
+  return {[=](GraspSystem& system) { return std::make_unique<CentralityMeasure>(system, joints); }};
 }
 
 MeasureRecipe joint_margin_recipe(double distance) {
@@ -197,6 +218,34 @@ EndTable climbs(GraspSystem& system, const DoubleArray& X, const MeasureRecipe& 
   return table_of(ends, system.configuration_size());
 }
 
+/// Rows of a measure at one grasp on the manifold, for tests; see climb/measure.hpp.
+ArrayTable measured(GraspSystem& system, const DoubleArray& x, const MeasureRecipe& recipe, double reach) {
+  if (x.size() != system.configuration_size())
+    throw Error("x must hold " + std::to_string(system.configuration_size()) + " numbers");
+  const int k = system.dimension(), n = system.tangent_size();
+  std::vector<double> on(x.data(), x.data() + x.size());
+  py::array_t<double> Phi = matrix<double>(k, n);
+  if (Newton(system).project_freely(on.data(), Phi.mutable_data()) != Projection::converged)
+    throw Error("the grasp cannot be projected onto the manifold; take one that is on it");
+  Surroundings at(system);
+  at.set(on.data(), Phi.data());
+  Rows rows(k);
+  recipe.make(system)->linearize(at, reach, rows);
+  py::array_t<double> ids(rows.size()), values(rows.size()), slopes = matrix<double>(rows.size(), k);
+  for (int row = 0; row < rows.size(); ++row) {
+    ids.mutable_at(row) = rows.id(row);
+    values.mutable_at(row) = rows.value(row);
+    std::copy_n(rows.slopes(row), k, slopes.mutable_data(row, 0));
+  }
+  ArrayTable table;
+  table["x"] = py::array_t<double>(x.size(), on.data());
+  table["ids"] = ids;
+  table["values"] = values;
+  table["slopes"] = slopes;
+  table["Phi"] = Phi;
+  return table;
+}
+
 py::array_t<double> missed(GraspSystem& system, const DoubleArray& X, const std::vector<MeasureRecipe>& requirements) {
   check_rows(system, X);
   std::vector<double> found;
@@ -217,6 +266,14 @@ void bind_climb(py::module_& module) {
              py::arg("margin") = 0.0, "The force-closure margin beyond one that is asked for.");
   module.def("closure_index_measure", &closure_index_recipe, py::arg("friction"),
              "The force-closure margin as an index, with its sign.");
+  module.def("holding_measure", &holding_recipe, py::arg("limits"), py::arg("at_least"),
+             "The holding force as a multiple of one that is asked for, less one; see climb/holding_measures.hpp.");
+  module.def("holding_index_measure", &holding_index_recipe, py::arg("limits"), "The holding force as an index.");
+  module.def("epsilon_measure", &epsilon_recipe, py::arg("friction"), py::arg("edges"), py::arg("torsional"),
+             py::arg("length"),
+             "Radius of the largest ball in the hull of contact wrenches; see climb/wrench_measures.hpp.");
+  module.def("centrality_measure", &centrality_recipe, py::arg("joints"),
+             "How near the joints are to the middle of their ranges; `joints` is how many the hand has.");
   module.def("joint_margin_measure", &joint_margin_recipe, py::arg("distance"),
              "Distances of the joints from their limits beyond one that is asked for.");
   module.def("distances_measure", &distances_recipe, py::arg("batch"), "Distances of hand and object.");
@@ -235,6 +292,9 @@ void bind_climb(py::module_& module) {
       "Climbs from each grasp of X [n x configuration_size] to a local maximum of the index within bounds and "
       "requirements: ends x [n x configuration_size], value, missed, kkt and evaluations [n], and lists of status "
       "and of values. See climb/climber.hpp.");
+  module.def("measured", &measured, py::arg("system"), py::arg("x"), py::arg("measure"), py::arg("reach"),
+             "Rows of a measure at a grasp, projected onto the manifold as x: their ids and values [r], slopes "
+             "[r x dimension] along the tangent basis Phi [dimension x tangent_size]. See climb/measure.hpp.");
   module.def("missed", &missed, py::arg("system"), py::arg("X"), py::arg("requirements"),
              "By how much each grasp of X misses the requirement that it misses most, in about units of the tangent "
              "space [n]; infinite where a requirement that is met or not is not met.");

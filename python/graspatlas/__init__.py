@@ -44,7 +44,7 @@ from graspatlas.requirements.force_closure import ForceClosure
 from graspatlas.requirements.holding_force import HoldingForce
 from graspatlas.requirements.joint_margin import JointMargin
 from graspatlas.result.gap import Gap
-from graspatlas.result.refinement import Refinement
+from graspatlas.result.refinement import Refinement, SearchReport
 from graspatlas.result.result import Result, load_result
 from graspatlas.search.grasp_search import find_grasps
 from graspatlas.simulation.outcome import Simulation, load_simulation
@@ -102,6 +102,7 @@ __all__ = [
     "Result",
     "Rung",
     "Samples",
+    "SearchReport",
     "SearchStatus",
     "Simulation",
     "Status",

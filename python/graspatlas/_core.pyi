@@ -40,17 +40,22 @@ __all__: list[str] = [
     "axes_measure",
     "ball_radii",
     "box_half_width",
+    "centrality_measure",
     "climbs",
     "closure_index_measure",
     "closure_measure",
     "contact_forces",
     "distances_from_hull",
     "distances_measure",
+    "epsilon_measure",
     "force_closure_margins",
     "force_closure_slacks",
     "holding_forces",
+    "holding_index_measure",
+    "holding_measure",
     "hull_volumes",
     "joint_margin_measure",
+    "measured",
     "min_weights",
     "missed",
     "numbers_measure",
@@ -744,6 +749,11 @@ def box_half_width(
     Half the width of the box that the polytopes of charts are cut from.
     """
 
+def centrality_measure(joints: typing.SupportsInt | typing.SupportsIndex) -> Measure:
+    """
+    How near the joints are to the middle of their ranges; `joints` is how many the hand has.
+    """
+
 def climbs(
     system: GraspSystem,
     X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -796,6 +806,16 @@ def distances_measure(batch: CollisionBatch) -> Measure:
     Distances of hand and object.
     """
 
+def epsilon_measure(
+    friction: typing.SupportsFloat | typing.SupportsIndex,
+    edges: typing.SupportsInt | typing.SupportsIndex,
+    torsional: typing.SupportsFloat | typing.SupportsIndex,
+    length: typing.SupportsFloat | typing.SupportsIndex,
+) -> Measure:
+    """
+    Radius of the largest ball in the hull of contact wrenches; see climb/wrench_measures.hpp.
+    """
+
 def force_closure_margins(
     system: GraspSystem,
     X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -823,6 +843,16 @@ def holding_forces(
     Largest disturbance from whatever side that each grasp withstands [n], newtons; see holding_force.hpp.
     """
 
+def holding_index_measure(limits: HoldingLimits) -> Measure:
+    """
+    The holding force as an index.
+    """
+
+def holding_measure(limits: HoldingLimits, at_least: typing.SupportsFloat | typing.SupportsIndex) -> Measure:
+    """
+    The holding force as a multiple of one that is asked for, less one; see climb/holding_measures.hpp.
+    """
+
 def hull_volumes(
     wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
 ) -> numpy.typing.NDArray[numpy.float64]:
@@ -833,6 +863,16 @@ def hull_volumes(
 def joint_margin_measure(distance: typing.SupportsFloat | typing.SupportsIndex) -> Measure:
     """
     Distances of the joints from their limits beyond one that is asked for.
+    """
+
+def measured(
+    system: GraspSystem,
+    x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    measure: Measure,
+    reach: typing.SupportsFloat | typing.SupportsIndex,
+) -> dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]]:
+    """
+    Rows of a measure at a grasp, projected onto the manifold as x: their ids and values [r], slopes [r x dimension] along the tangent basis Phi [dimension x tangent_size]. See climb/measure.hpp.
     """
 
 def min_weights(

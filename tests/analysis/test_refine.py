@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 import graspatlas as ga
+from graspatlas.analysis.climb import climbs_from
+from graspatlas.analysis.objective import Objective
 from graspatlas.cli import main
 from graspatlas.collision.checker import CollisionChecker
 
@@ -192,14 +194,15 @@ def test_an_interrupted_refinement_keeps_what_it_has(planar_result: ga.Result, m
     result = planar_result
     calls = 0
 
-    def impatient(*arguments: object, **options: object) -> ga.Climb:
+    def impatient(*arguments: object) -> list[ga.Climb]:
         nonlocal calls
         calls += 1
         if calls > 1:
             raise KeyboardInterrupt
-        return ga.climb(*arguments, **options)  # type: ignore[arg-type]
+        return climbs_from(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("graspatlas.analysis.refine.climb", impatient)
+    monkeypatch.setattr("graspatlas.analysis.refine.BATCH", 1)
+    monkeypatch.setattr("graspatlas.analysis.refine.climbs_from", impatient)
     first = ga.refine(result)
     assert not first.complete
     assert first.n_peaks == 1
@@ -212,12 +215,12 @@ def test_an_interrupted_climb_in_f_keeps_those_in_r(monkeypatch: pytest.MonkeyPa
     result = ga.optimize(ga.load_problem("planar_hand"), radius=0.25)
     inside = ga.refine(result)
 
-    def impatient(*arguments: object, **options: object) -> ga.Climb:
-        if options.get("all_motions"):
+    def impatient(objective: Objective, *arguments: object) -> list[ga.Climb]:
+        if objective.system.dimension > result.dimension:
             raise KeyboardInterrupt
-        return ga.climb(*arguments, **options)  # type: ignore[arg-type]
+        return climbs_from(objective, *arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("graspatlas.analysis.refine.climb", impatient)
+    monkeypatch.setattr("graspatlas.analysis.refine.climbs_from", impatient)
     kept = ga.refine(result, all_motions=True)
     assert not kept.complete
     np.testing.assert_array_equal(kept.qualities, inside.qualities)

@@ -27,12 +27,12 @@ class Flat:
         self.f, self.x, self.value, self.reach = f, x, value, reach
         self.Phi = np.eye(len(x))
 
-    def evaluate(self, W: Array) -> tuple[Array, Array]:
+    def gains(self, W: Array) -> Array:
         values = np.array([self.f(self.x + self.reach * w) for w in W])
-        return (values - self.value) / abs(self.value), np.ones((len(W), 0))
+        return (values - self.value) / abs(self.value)
 
     def better(self, W: Array) -> tuple[Array, float] | None:
-        gains = self.evaluate(W)[0]
+        gains = self.gains(W)
         best = int(gains.argmax())
         return (self.x + self.reach * W[best], self.f(self.x + self.reach * W[best])) if gains[best] > 1e-7 else None
 

@@ -36,6 +36,7 @@ constexpr double kKinkStep = 1e-7;   // of differences near a kink, so that they
 constexpr std::size_t kMostCuts = 60;
 constexpr double kTiny = 1e-7, kSampled = 1e-5;  // trust radius at which slopes around are sampled, and how far
 constexpr int kMostSamplings = 4;
+constexpr double kSharp = 1e-3;          // relative fall of the index within a step of the differences
 constexpr int kChallenges = 3;           // times that a maximum may prove to be none
 constexpr double kChallengeGain = 1e-8;  // of the index, relative, that shows it
 constexpr double kSameEnd = 1e-6;        // relative difference of indices that rounding of requirements makes
@@ -193,7 +194,10 @@ Climber::Outcome Climber::step() {
   if (!repairing_ && kkt_ < kConverged && current_.missed <= kMet) {
     double farthest = 0.0;
     for (const Cut& cut : cuts_) farthest = std::max(farthest, cut.at.lpNorm<Eigen::Infinity>());
-    if (farthest <= kKinkSize) return challenged() ? Outcome::taken : end_step(ClimbStatus::converged);
+    if (farthest <= kKinkSize) {
+      if (falls_at_once()) return end_step(ClimbStatus::stalled);
+      return challenged() ? Outcome::taken : end_step(ClimbStatus::converged);
+    }
     trust_radius_ = std::max(0.1 * farthest / kCutReach, kShortest);
     shift_cuts(Vector::Zero(k_), 0.0);
     return Outcome::refused;
@@ -404,6 +408,18 @@ void Climber::sample_cuts() {
     if (try_step(w)) add_cuts(w);
   }
   trust_radius_ = radius;
+}
+
+// Whether the index falls within the reach of the differences by more than a kink lets it: beside a pole differences
+// from both sides cancel, and what they give is no slope.
+bool Climber::falls_at_once() {
+  double value;
+  for (int i = 0; i < k_; ++i)
+    for (const double* x : {here_.ahead(i), here_.behind(i)}) {
+      index_.revisit(x, &value);
+      if (!(std::abs(gain(value)) < kSharp)) return true;
+    }
+  return false;
 }
 
 // Whether a grasp near a maximum is better after all; then the climb goes on from there.

@@ -91,6 +91,7 @@ class Climber {
   void shift_cuts(const Vector& w, double gained);
   void add_cuts(const Vector& w);
   void sample_cuts();
+  bool falls_at_once();
   bool challenged();
   void keep_if_best();
   ClimbEnd end() const;

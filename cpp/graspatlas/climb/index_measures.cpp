@@ -1,5 +1,8 @@
 #include "graspatlas/climb/index_measures.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "graspatlas/errors.hpp"
 
 namespace graspatlas {
@@ -28,6 +31,22 @@ double AxesMeasure::value(const double* x) {
   if (index_ == AxesIndex::volume) return axes.prod();
   if (index_ == AxesIndex::smallest) return axes(0);
   return axes(connectivity_ - 1) > 0.0 ? axes(0) / axes(connectivity_ - 1) : 0.0;
+}
+
+CentralityMeasure::CentralityMeasure(const GraspSystem& system, int joints) : joints_(std::max(joints, 1)) {
+  for (std::size_t i = 0; i < system.lower_limits().size(); ++i) {
+    const double lower = system.lower_limits()[i], upper = system.upper_limits()[i], half = 0.5 * (upper - lower);
+    if (std::isfinite(half) && half > 0.0) ranges_.push_back({i, 0.5 * (lower + upper), half});
+  }
+}
+
+double CentralityMeasure::value(const double* x) {
+  double sum = 0.0;
+  for (const Range& range : ranges_) {
+    const double away = (x[range.at] - range.middle) / range.half;
+    sum += away * away;
+  }
+  return 1.0 - sum / joints_;
 }
 
 BatchMeasure::BatchMeasure(const GraspSystem& system, std::function<RowsFunction(const RowMatrix& x)> near)

@@ -37,6 +37,24 @@ class AxesMeasure : public NumberMeasure {
   Vector axes_;
 };
 
+/// How near the joints are to the middle of their ranges, between 0 and 1.
+class CentralityMeasure : public NumberMeasure {
+ public:
+  /// `joints` is the number of joints of the hand, those without two limits included.
+  CentralityMeasure(const GraspSystem& system, int joints);
+
+ protected:
+  double value(const double* x) override;
+
+ private:
+  struct Range {
+    std::size_t at;  // number of the joint in x
+    double middle, half;
+  };
+  std::vector<Range> ranges_;
+  int joints_;
+};
+
 /// Rows of numbers [n x c] of grasps X [n x configuration_size] that somebody else computes, as a function in Python.
 using RowsFunction = std::function<RowMatrix(const RowMatrix& X)>;
 

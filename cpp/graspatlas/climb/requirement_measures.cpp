@@ -66,24 +66,28 @@ bool JointMarginMeasure::revisit(const double* x, double* values) {
   return true;
 }
 
+double bounded_closure(double slack) {
+  const double bounded = std::max(slack, kLeastSlack);
+  return bounded >= kFarOpen ? bounded : kFarOpen - std::log(-bounded);
+}
+
+void write_closure_slopes(ForceClosure& closure, double slack, const Surroundings& at, double* slopes) {
+  std::fill_n(slopes, at.dimension(), 0.0);
+  if (!(slack > kLeastSlack)) return;
+  closure.keep_multipliers();
+  const double factor = slack >= kFarOpen ? 1.0 : -1.0 / slack;
+  for (int i = 0; i < at.dimension(); ++i)
+    slopes[i] = factor * at.slope(closure.lagrangian(at.ahead(i)), closure.lagrangian(at.behind(i)));
+}
+
 ClosureMeasure::ClosureMeasure(GraspSystem& system, double friction, double torsional, double margin)
     : closure_(system, friction, torsional), margin_(margin + kInside) {}
 
-// Where hardly any internal force presses the slack falls without bound; steps are those of its logarithm there.
-double ClosureMeasure::excess(double slack) const {
-  const double bounded = std::max(slack, kLeastSlack);
-  return (bounded >= kFarOpen ? bounded : kFarOpen - std::log(-bounded)) - margin_;
-}
+double ClosureMeasure::excess(double slack) const { return bounded_closure(slack) - margin_; }
 
 void ClosureMeasure::linearize(const Surroundings& at, double, Rows& rows) {
   const double slack = closure_.slack(at.x());
-  double* slopes = rows.add(0, excess(slack));
-  std::fill_n(slopes, at.dimension(), 0.0);
-  if (!(slack > kLeastSlack)) return;
-  closure_.keep_multipliers();
-  const double factor = slack >= kFarOpen ? 1.0 : -1.0 / slack;
-  for (int i = 0; i < at.dimension(); ++i)
-    slopes[i] = factor * at.slope(closure_.lagrangian(at.ahead(i)), closure_.lagrangian(at.behind(i)));
+  write_closure_slopes(closure_, slack, at, rows.add(0, excess(slack)));
 }
 
 bool ClosureMeasure::revisit(const double* x, double* values) {

@@ -49,6 +49,13 @@ class JointMarginMeasure : public Measure {
   std::vector<int> seen_;
 };
 
+/// The slack of closure as a climb sees it: where hardly any internal force presses it falls without bound, so by its
+/// logarithm there.
+double bounded_closure(double slack);
+
+/// Slopes of that [dimension], of the closure whose `slack` at the grasp has just been asked for.
+void write_closure_slopes(ForceClosure& closure, double slack, const Surroundings& at, double* slopes);
+
 /// The force-closure margin with its sign, less one that is asked for; as an index the margin itself.
 class ClosureMeasure : public Measure {
  public:

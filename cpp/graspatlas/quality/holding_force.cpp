@@ -17,6 +17,7 @@ constexpr double kProgramShare = 0.5;  // of the gap, that of each reach
 constexpr double kLoadGap = 1e-6;      // relative, of the force along one direction
 constexpr double kStartShare = 0.5;    // of the budget and the efforts that the forces have from which programmes start
 constexpr double kNoBudget = 1e4;      // units of normal force that stand for any
+constexpr double kSideShare = 0.95;    // of forces, how much those of facets have of the hull's and not of the centre's
 constexpr double kEnough = 1.1;        // times the least reach, beyond which a reach is known well enough
 
 }  // namespace
@@ -160,6 +161,30 @@ double HoldingForce::ball_radius(WrenchHull<D>& hull) {
     return upper;
   };
   return hull.ball_radius(points, least, limits_.gap, reach);
+}
+
+// The point of a facet that is nearest to the origin is a mean of its corners; where rounding weighs one negatively,
+// the weight is none.
+template <int D>
+std::vector<HoldingForce::Side> HoldingForce::sides_within(const WrenchHull<D>& hull, double distance) const {
+  std::vector<Side> sides;
+  Eigen::Matrix<double, D, D> corners;
+  Vector y(y_.size());
+  for (const auto& side : hull.sides_within(distance)) {
+    for (int k = 0; k < D; ++k) corners.col(k) = reach_map_ * optima_.col(side.corners[k]);
+    Eigen::Matrix<double, D, 1> weights = corners.partialPivLu().solve(side.normal * side.distance);
+    weights = weights.cwiseMax(0.0);
+    y.setZero();
+    for (int k = 0; k < D; ++k) y += weights(k) / weights.sum() * optima_.col(side.corners[k]);
+    sides.push_back({side.distance, side.normal, basis_ * (kSideShare * y + (1.0 - kSideShare) * y_)});
+  }
+  return sides;
+}
+
+std::vector<HoldingForce::Side> HoldingForce::sides_within(double distance) const {
+  if (reach_map_.rows() == 2) return sides_within(hull2_, distance);
+  if (reach_map_.rows() == 3) return sides_within(hull3_, distance);
+  return sides_within(hull6_, distance);
 }
 
 double HoldingForce::along(const double* x, const double* direction) {

@@ -39,6 +39,22 @@ class HoldingForce {
   /// H at x [N].
   double largest(const double* x);
 
+  /// A facet of the hull that `largest` has refined, and forces that reach to its point nearest to the origin.
+  struct Side {
+    double distance;   ///< of its plane [units]
+    Vector direction;  ///< its unit normal
+    Vector z;          ///< coordinates of the forces, strictly inside the cones and the budget
+  };
+  /// Those of the last hull that are at most so far from the origin [units], the nearest first.
+  std::vector<Side> sides_within(double distance) const;
+
+  double unit() const { return unit_; }                    ///< of forces [N]
+  const RowMatrix& wrenches() const { return wrenches_; }  ///< [object_dof x z] about the centre of mass
+  const Eigen::Matrix3d& object_rotation() const { return rotation_; }
+  const std::vector<ContactPoint>& points() const { return closure_.points(); }
+  int directions() const { return directions_; }  ///< of a force: three, in the plane two
+  int cone_size() const { return cone_size_; }    ///< coordinates of a contact's force
+
   /// The largest force along a unit vector [space_dimension] in the object's frame, at its centre of mass, that the
   /// grasp withstands [N], to one part in a million; NaN where rounding leaves it less certain.
   double along(const double* x, const double* direction);
@@ -49,6 +65,8 @@ class HoldingForce {
   void set_program(const RowMatrix& equations);
   template <int D>
   double ball_radius(WrenchHull<D>& hull);
+  template <int D>
+  std::vector<Side> sides_within(const WrenchHull<D>& hull, double distance) const;
 
   GraspSystem& system_;
   HoldingLimits limits_;

@@ -179,6 +179,17 @@ double WrenchHull<D>::ball_radius(const Eigen::Ref<const Points>& points, double
   }
 }
 
+template <int D>
+std::vector<typename WrenchHull<D>::Side> WrenchHull<D>::sides_within(double distance) const {
+  std::vector<Side> sides;
+  for (const Facet& facet : facets_)
+    if (facet.distance <= distance) sides.push_back({facet.normal, facet.distance, facet.corners});
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return a.distance != b.distance ? a.distance < b.distance : a.corners < b.corners;
+  });
+  return sides;
+}
+
 // The sum over the facets of the simplices with the centre, each with its sign: a fold cancels itself.
 template <int D>
 double WrenchHull<D>::volume(const Eigen::Ref<const Points>& points) {

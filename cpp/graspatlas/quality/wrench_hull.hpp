@@ -52,6 +52,17 @@ class WrenchHull {
   /// ends when these are within `relative_gap`, or with the lower bound there is after the most points or facets.
   double ball_radius(const Eigen::Ref<const Points>& points, double least, double relative_gap, const Reach& reach);
 
+  /// A facet: the plane of its corners, points of the last hull, in the direction of its outward unit normal.
+  struct Side {
+    Point normal;
+    double distance;  ///< of its plane from the origin
+    Corners corners;
+  };
+
+  /// Facets of the last hull whose planes are at most so far from the origin, the nearest first; none where that hull
+  /// is flat.
+  std::vector<Side> sides_within(double distance) const;
+
   /// Volume of the hull of the points; zero when they lie in one plane.
   double volume(const Eigen::Ref<const Points>& points);
 

@@ -12,12 +12,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from graspatlas.analysis.objective import BOUND_TOLERANCE, Ends, Objective
-from graspatlas.analysis.unbounded import followed, is_sharp, levels_around, never_levels_off, rises_towards_one_point
+from graspatlas.analysis.unbounded import (
+    Around,
+    followed,
+    is_sharp,
+    levels_around,
+    never_levels_off,
+    rises_towards_one_point,
+)
 from graspatlas.errors import GraspAtlasError
 from graspatlas.result.grasp_atlas import GraspAtlas, check_is_result
 from graspatlas.support.arrays import Array
@@ -171,14 +179,15 @@ def _judged(objective: Objective, end: Climb) -> Climb:
     """A climb with whether it ran after an index without a maximum: only one that has not converged can have."""
     if end.converged:
         return end
-    levels = levels_around(objective, end.x, end.quality)
+    near = partial(Around, objective)
+    levels = levels_around(near, end.x, end.quality, objective.radius)
     if rises_towards_one_point(levels):
         return replace(end, unbounded=True)
     if is_sharp(levels):
-        x, value = followed(objective, end.x, end.quality)
+        x, value = followed(near, end.x, end.quality, objective.radius)
         if value > end.quality:
             end = replace(end, x=x, qualities=np.append(end.qualities, value))
-            levels = levels_around(objective, x, value)
+            levels = levels_around(near, x, value, objective.radius)
         return replace(end, unbounded=never_levels_off(levels))
     return end
 

@@ -9,13 +9,16 @@ every ring.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Protocol
+
 import numpy as np
 
 from graspatlas import _core
 from graspatlas.analysis.objective import Objective
 from graspatlas.support.arrays import Array
 
-__all__ = ["followed", "is_sharp", "levels_around", "never_levels_off", "rises_towards_one_point"]
+__all__ = ["Around", "followed", "is_sharp", "levels_around", "never_levels_off", "rises_towards_one_point"]
 
 
 #: Sizes of the rings, as shares of the chart radius.
@@ -36,8 +39,24 @@ FINEST = 1e-7
 MOST_STEPS = 200
 
 
-class Neighbourhood:
-    """The tangent space at a grasp, in coordinates w [k] with |w| = 1 at a radius, and the index above it.
+class Neighbourhood(Protocol):
+    """A grasp and what is above the tangent space there, in coordinates w [k] with |w| = 1 at a radius."""
+
+    Phi: Array
+
+    def gains(self, W: Array) -> Array:
+        """Gains over the grasp, as shares of its index, of the points above W [n, k] that meet everything [m]."""
+
+    def better(self, W: Array) -> tuple[Array, float] | None:
+        """The best of the points above W that meet everything, and its index, if that is larger."""
+
+
+#: The surroundings of a grasp with this index, at this radius.
+NeighbourhoodOf = Callable[[Array, float, float], Neighbourhood]
+
+
+class Around:
+    """The grasps around one; see :class:`Neighbourhood`.
 
     Args:
         objective: The index, and what grasps must meet.
@@ -48,44 +67,46 @@ class Neighbourhood:
 
     def __init__(self, objective: Objective, x: Array, value: float, radius: float) -> None:
         self.objective, self.x, self.value, self.radius = objective, x, value, radius
+        self.scale = max(abs(value), 1e-12)
         J = objective.system.evaluate_jacobian(x)
         self.Phi = np.ascontiguousarray(np.linalg.svd(J)[2][len(J) :])
 
-    def points(self, W: Array) -> Array:
-        """Grasps above W [n, k] that meet bounds and requirements, eqs (14) and (15) [m, configuration_size]."""
+    def gains(self, W: Array) -> Array:
+        """See :meth:`Neighbourhood.gains`."""
+        return (self.objective.values(self._points(W)) - self.value) / self.scale
+
+    def better(self, W: Array) -> tuple[Array, float] | None:
+        """See :meth:`Neighbourhood.better`."""
+        X = self._points(W)
+        if not len(X):
+            return None
+        values = self.objective.values(X)
+        top = int(values.argmax())
+        return (X[top], float(values[top])) if values[top] > self.value + LEAST_GAIN * self.scale else None
+
+    def _points(self, W: Array) -> Array:
+        """Grasps above W that meet bounds and requirements, eqs (14) and (15) [m, configuration_size]."""
         above = [_core.project(self.objective.system, self.x, self.Phi, self.radius * w) for w in W]
         X = np.array([x for x in above if x is not None]).reshape(-1, len(self.x))
         return X[self.objective.meets(X)]
 
-    def gains(self, X: Array) -> Array:
-        """By how much the index of grasps is larger, as a share of that of the grasp [n]."""
-        return (self.objective.values(X) - self.value) / max(abs(self.value), 1e-12)
 
-    def best(self, W: Array) -> tuple[Array, float] | None:
-        """The best of the grasps above W and its index, if that is larger."""
-        X = self.points(W)
-        gains = self.gains(X)
-        if not len(X) or gains.max() < LEAST_GAIN:
-            return None
-        top = int(gains.argmax())
-        return X[top], self.value + float(gains[top]) * max(abs(self.value), 1e-12)
-
-
-def levels_around(objective: Objective, x: Array, value: float) -> Array:
+def levels_around(near: NeighbourhoodOf, x: Array, value: float, radius: float) -> Array:
     """Median of the index on each ring around a grasp, less the index there, as a share of it; NaN without grasps.
 
     Args:
-        objective: The index, and what grasps must meet.
+        near: The surroundings of a grasp.
         x: The grasp [configuration_size].
         value: The index there.
+        radius: Chart radius, of which the rings are shares.
 
     Returns:
         One value a ring, the largest ring first [5]; negative where the index is below that of the grasp.
     """
     levels = np.full(len(RINGS), np.nan)
     for i, share in enumerate(RINGS):
-        near = Neighbourhood(objective, x, value, share * objective.radius)
-        gains = near.gains(near.points(_ring(RING_POINTS, len(near.Phi), seed=0)))
+        around = near(x, value, share * radius)
+        gains = around.gains(_ring(RING_POINTS, len(around.Phi), seed=0))
         if len(gains) >= FEWEST:
             levels[i] = np.median(gains)
     return levels
@@ -111,24 +132,25 @@ def _lasts(levels: Array) -> bool:
     return bool(levels[0] < -RUN_AWAY and gains[0] > 0.0 and (gains[1:] >= LASTING * gains[:-1]).all())
 
 
-def followed(objective: Objective, x: Array, value: float) -> tuple[Array, float]:
+def followed(near: NeighbourhoodOf, x: Array, value: float, radius: float) -> tuple[Array, float]:
     """Where ever smaller steps lead from a sharp place, and the index there: the best of a ring, or a smaller ring.
 
     Args:
-        objective: The index, and what grasps must meet; the first ring has a hundredth of its radius.
+        near: The surroundings of a grasp.
         x: Where to start [configuration_size].
         value: The index there.
+        radius: Chart radius; the first ring has a hundredth of it.
     """
-    radius = RINGS[1] * objective.radius
+    ring = RINGS[1] * radius
     for step in range(MOST_STEPS):
-        near = Neighbourhood(objective, x, value, radius)
-        found = near.best(_ring(8 * len(near.Phi), len(near.Phi), seed=step))
+        around = near(x, value, ring)
+        found = around.better(_ring(8 * len(around.Phi), len(around.Phi), seed=step))
         if found is not None:
             x, value = found
-        elif radius <= FINEST * objective.radius:
+        elif ring <= FINEST * radius:
             break
         else:
-            radius *= 0.5
+            ring *= 0.5
     return x, value
 
 

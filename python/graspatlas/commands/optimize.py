@@ -14,11 +14,14 @@ from graspatlas.commands.arguments import Subcommands, path_word
 from graspatlas.commands.exit_status import FAILED, INTERRUPTED
 from graspatlas.commands.report import component_lines, result_lines
 from graspatlas.errors import GraspAtlasError
+from graspatlas.multistart.checkpoint import RoundFolder
+from graspatlas.multistart.search import SHARE
 from graspatlas.optimizer.components import Components, SearchStatus, find_components
 from graspatlas.optimizer.optimize import optimize
 from graspatlas.problem.requirement import parse_requirement
 from graspatlas.problems import load_problem
 from graspatlas.quality.evaluation import INDICES
+from graspatlas.result.refinement import SearchEnd
 from graspatlas.support.files import replaced, writable_folder
 from graspatlas.support.terminal import say
 
@@ -68,6 +71,21 @@ def add_optimize_command(commands: Subcommands) -> None:
         "all feasible ones, no hand motion frozen but couplings",
     )
     best.add_argument(
+        "--motions",
+        choices=("relevant", "all"),
+        default="relevant",
+        help="with 'all' search the best of all feasible grasps, no hand motion frozen but couplings: climbs from many "
+        "starts until little can be missing",
+    )
+    best.add_argument(
+        "--share-missing",
+        type=float,
+        default=SHARE,
+        metavar="P",
+        help="such a search ends when at most this share of climbs may lead to maxima not found, 0.01 by default",
+    )
+    best.add_argument("--seed", type=int, default=0, metavar="N", help="seed of such a search, 0 by default")
+    best.add_argument(
         "--refine-steps",
         type=int,
         default=MAX_STEPS,
@@ -111,22 +129,27 @@ def _optimize(options: argparse.Namespace) -> int:
         "threads",
     )
     given = {name: getattr(options, name) for name in names}
+    if options.components and options.motions == "all":
+        raise GraspAtlasError("a search over all motions looks into all components: leave --components out")
     if options.components:
         if options.workers is not None or options.scheduler is not None:
             raise GraspAtlasError("components are searched in this process: leave --workers and --scheduler out")
         return _report_components(find_components(problem, **given, require=require, progress=True), options, folder)
     checkpoint = folder / "checkpoint" if folder else None
-    where = {"workers": options.workers, "scheduler": options.scheduler}
-    result = optimize(problem, **given, **where, require=require, checkpoint=checkpoint, progress=True)
+    search = {name: getattr(options, name) for name in ("motions", "share_missing", "seed", "workers", "scheduler")}
+    result = optimize(problem, **given, **search, require=require, checkpoint=checkpoint, progress=True)
     if folder:
         result.save(folder / "result.npz")
         _write_json(result.summary(), folder / "summary.json")
         if result.status in (Status.COMPLETE, Status.BLOCKED):
+            if result.refinement is None or result.refinement.complete:
+                RoundFolder.remove(folder / "checkpoint" / "rounds")
             CheckpointFolder.remove(folder / "checkpoint")
     say(json.dumps(result.summary()) if options.json else "\n".join(result_lines(result, folder)))
-    if result.status is Status.INTERRUPTED:
+    search_ended = result.refinement.search.status if result.refinement and result.refinement.search else None
+    if result.status is Status.INTERRUPTED or search_ended is SearchEnd.INTERRUPTED:
         return INTERRUPTED
-    return 0 if result.accepted.any() else FAILED
+    return 0 if result.accepted.any() or result.refinement else FAILED
 
 
 def _report_components(found: Components, options: argparse.Namespace, folder: Path | None) -> int:

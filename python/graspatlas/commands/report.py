@@ -7,7 +7,7 @@ from pathlib import Path
 from graspatlas.atlas.status import Status
 from graspatlas.optimizer.components import Components, SearchStatus
 from graspatlas.quality.batched import quality_name
-from graspatlas.result.refinement import Refinement
+from graspatlas.result.refinement import Refinement, SearchEnd, SearchReport
 from graspatlas.result.result import Result
 from graspatlas.result.summary import GapSummary
 from graspatlas.support.arrays import Array
@@ -53,7 +53,12 @@ def result_lines(result: Result, folder: Path | None) -> list[str]:
     if result.requirements:
         counts = ", ".join(f"{name} rejected {count}" for name, count in result.rejected.items())
         lines.append(f"  {result.accepted.sum()} grasps meet the requirements; checked in this order, {counts}")
-    lines += _best_lines(result) if result.accepted.any() else ["  no best grasp: relax a requirement"]
+    if result.accepted.any():
+        lines += _best_lines(result)
+    elif result.refinement:
+        lines.append("  none of the charts meets the requirements, but grasps with other hand motions do:")
+    else:
+        lines.append("  no best grasp: relax a requirement, or search among all motions: --motions all")
     if result.refinement:
         lines += _refined_lines(result)
     if summary["gap"]:
@@ -97,16 +102,31 @@ def _refined_lines(result: Result) -> list[str]:
     else:
         peaks = f"{refinement.n_peaks} local maxima" if refinement.n_peaks > 1 else "one local maximum"
         what = f"the highest of {peaks}" if refinement.converged[0] else "not yet a maximum"
+        gain = f" ({100.0 * result.gain:+.3g} %)" if result.accepted.any() else ""
         lines = [
-            f"  refined best {best.quality:.9g} ({100.0 * result.gain:+.3g} %), {what} among {where}:",
+            f"  refined best {best.quality:.9g}{gain}, {what} among {where}:",
             f"    object at {_row(best.object_xyz)} m, quaternion xyzw {_row(best.object_quat_xyzw)}, "
             "joints [rad or m]:",
             *(f"    {joint:20} {value:9.4f}" for joint, value in best.joint_positions.items()),
         ]
+    if refinement.search:
+        lines += _search_lines(refinement.search, float(refinement.kkt[0]))
     if refinement.advice:
         lines.append(f"    {refinement.advice}")
-    if not refinement.complete:
+    if not refinement.complete and refinement.search is None:
         lines.append("    interrupted: local maxima may be missing")
+    return lines
+
+
+def _search_lines(search: SearchReport, kkt: float) -> list[str]:
+    """What a search over all feasible grasps did, and what it can say of what it did not find."""
+    lines = [
+        f"    {search.best_hits} of {search.climbs} climbs ended there, {search.met} at grasps that meet the "
+        f"requirements, in {search.seconds:.1f} s; residual of the optimality conditions {kkt:.1e}",
+        f"    maxima not found yet get {search.share_missing:.1%} of such climbs, by expectation",
+    ]
+    if search.status not in (SearchEnd.ENOUGH, SearchEnd.UNBOUNDED):
+        lines.append(f"    search cut short ({search.status}): better maxima may be missing")
     return lines
 
 

@@ -73,6 +73,14 @@ class RoundFolder:
         with replaced(self._path(new.number)) as stream:
             np.savez(stream, digest=self.digest, **{**values, "kind": str(new.kind)})
 
+    @staticmethod
+    def remove(folder: Path) -> None:
+        """Remove the rounds of a search, and the folder if nothing else is in it."""
+        for path in folder.glob("round[0-9]*.npz"):
+            path.unlink()
+        if folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
+
     def _path(self, number: int) -> Path:
         return self.folder / f"round{number:06}.npz"
 

@@ -67,8 +67,8 @@ def sealed(plan: Plan) -> bytes:
             cloudpickle.dumps(part)
         except Exception as error:
             raise GraspAtlasError(
-                f"{name} cannot be sent to workers ({type(error).__name__}: {error}): let it hold nothing but plain data "
-                "and open what it needs when it is called, or search without workers"
+                f"{name} cannot be sent to workers ({type(error).__name__}: {error}): let it hold plain data alone, "
+                "and open what it needs when it is called; or search without workers"
             ) from None
     return bytes(cloudpickle.dumps(plan))
 

@@ -6,12 +6,13 @@ import os
 import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
+from functools import partial
 
 import numpy as np
 from tqdm import tqdm
 
 from graspatlas.analysis.objective import Objective
-from graspatlas.analysis.unbounded import levels_around, never_levels_off, rises_towards_one_point
+from graspatlas.analysis.unbounded import Around, levels_around, never_levels_off, rises_towards_one_point
 from graspatlas.errors import GraspAtlasError
 from graspatlas.multistart.census import Census, FoundPeak
 from graspatlas.multistart.checkpoint import RoundFolder
@@ -158,7 +159,7 @@ class Search:
     def _unbounded(self, peak: FoundPeak) -> bool:
         """Whether the index grows without bound where climbs ended that have not converged."""
         if id(peak.x) not in self._bounded:
-            levels = levels_around(self.objective, peak.x, peak.value)
+            levels = levels_around(partial(Around, self.objective), peak.x, peak.value, FIRST_STEP)
             self._bounded[id(peak.x)] = not (rises_towards_one_point(levels) or never_levels_off(levels))
         return not self._bounded[id(peak.x)]
 

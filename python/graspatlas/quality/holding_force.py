@@ -22,11 +22,12 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.execution.contact_forces import NORMAL_FORCE, actuated_efforts
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.hand.hand import Hand
+from graspatlas.problem.problem import Problem
 from graspatlas.quality.batched import batched
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import number, number_array, positive
 
-__all__ = ["GAP", "Efforts", "holding_force", "resisted_load"]
+__all__ = ["GAP", "Efforts", "holding_force", "holding_limits", "resisted_load"]
 
 #: Whether the efforts of the URDF limit the joints; or a limit for all, or by the name of an actuated joint [N m or N].
 Efforts = bool | float | Mapping[str, float]
@@ -79,7 +80,7 @@ def holding_force(
     forces; R. Krug, Y. Bekiroglu, M. A. Roa, "Grasp Quality Evaluation Done Right: How Assumed Contact Force Bounds
     Affect Wrench-Based Quality Metrics", ICRA 2017, for why the bounds of forces must be those of the hand.
     """
-    limits = _limits(grasps, friction, normal_force, torsional, torque_length, efforts, gap)
+    limits = holding_limits(grasps.problem, friction, normal_force, torsional, torque_length, efforts, gap)
     return np.asarray(_core.holding_forces(grasps.system, grasps.x, limits))
 
 
@@ -119,7 +120,7 @@ def resisted_load(
     lengths = np.linalg.norm(given, axis=-1, keepdims=True)
     if not (lengths > 0.0).all():
         raise GraspAtlasError("direction has the length 0; say where the force points")
-    limits = _limits(grasps, friction, normal_force, torsional, 0.0, efforts, GAP)
+    limits = holding_limits(grasps.problem, friction, normal_force, torsional, 0.0, efforts, GAP)
     directions = np.ascontiguousarray(np.broadcast_to(given / lengths, (n, axes)))
     loads = np.asarray(_core.resisted_loads(grasps.system, grasps.x, directions, limits))
     if np.isnan(loads).any():
@@ -130,18 +131,29 @@ def resisted_load(
     return loads
 
 
-def _limits(
-    grasps: Grasps,
-    friction: float,
-    normal_force: float | None,
-    torsional: float,
-    torque_length: float,
-    efforts: Efforts,
-    gap: float,
+def holding_limits(
+    problem: Problem,
+    friction: float = 0.5,
+    normal_force: float | None = None,
+    torsional: float = 0.0,
+    torque_length: float = 0.0,
+    efforts: Efforts = False,
+    gap: float = GAP,
 ) -> _core.HoldingLimits:
-    hand, limited = grasps.problem.hand, efforts is not False
+    """What the compiled core is told of what holds the object; arguments, defaults and errors of :func:`holding_force`.
+
+    Args:
+        problem: The problem.
+        friction: Coefficient of friction mu.
+        normal_force: The most that the normal forces may add up to [N].
+        torsional: Torsional friction [m].
+        torque_length: Length that divides torques of disturbances [m].
+        efforts: Limits of the actuated joints.
+        gap: Relative difference from the largest force, at most.
+    """
+    hand, limited = problem.hand, efforts is not False
     if normal_force is None:
-        budget = NORMAL_FORCE * len(grasps.problem.contacts)
+        budget = NORMAL_FORCE * len(problem.contacts)
     elif limited and number(normal_force, "normal_force") == np.inf:
         budget = np.inf
     else:
@@ -151,7 +163,7 @@ def _limits(
         torsional=number(torsional, "torsional"),
         normal_force=budget,
         efforts=_efforts(hand, efforts) if limited else np.zeros(0),
-        center_of_mass=grasps.problem.object.center_of_mass,
+        center_of_mass=problem.object.center_of_mass,
         torque_length=number(torque_length, "torque_length"),
         gap=positive(gap, "gap", 0.5),
     )

@@ -9,6 +9,7 @@ import numpy as np
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasps
+from graspatlas.problem.problem import Problem
 from graspatlas.quality import wrenches
 from graspatlas.quality.batched import batched
 from graspatlas.support.arrays import Array
@@ -20,8 +21,11 @@ __all__ = [
     "grasp_isotropy",
     "min_weight",
     "soft_finger_epsilon",
+    "torque_divisor",
 ]
 
+#: Arguments of the indices where none are given: friction, torsional friction of soft fingers [m], edges of pyramids.
+FRICTION, TORSIONAL, EDGES = 0.5, 0.005, 8
 #: A singular value of G this far below the largest is zero.
 RANK_TOLERANCE = 1e-9
 
@@ -32,21 +36,29 @@ def _contacts(grasps: Grasps) -> tuple[Array, Array]:
     return (grasps.contact_points - origin) @ R, grasps.contact_normals @ R
 
 
-def _length(grasps: Grasps, length_unit: float | None) -> float:
-    """The length that divides torques: that given, or the one of the problem, which is the same for all its grasps."""
+def torque_divisor(problem: Problem, length_unit: float | None = None) -> float:
+    """The length that divides torques: that given, or the one of the problem, which is the same for all its grasps [m].
+
+    Args:
+        problem: The problem.
+        length_unit: The length given [m].
+
+    Raises:
+        GraspAtlasError: If the length is not positive, or the problem has none.
+    """
     if length_unit is not None:
         return positive(length_unit, "length_unit")
-    length = grasps.problem.torque_arm
+    length = problem.torque_arm
     if not length > 0.0:
         raise GraspAtlasError(
-            f"all contacts of problem '{grasps.problem.name}' lie at the object's origin, which leaves no length to "
+            f"all contacts of problem '{problem.name}' lie at the object's origin, which leaves no length to "
             "divide torques by; move that origin, state torque_length in the problem or give length_unit [m]"
         )
     return length
 
 
 def _wrenches(grasps: Grasps, friction: float, edges: int, length_unit: float | None, torsional: float = 0.0) -> Array:
-    length = _length(grasps, length_unit)
+    length = torque_divisor(grasps.problem, length_unit)
     return wrenches.contact_wrenches(
         *_contacts(grasps), friction, edges, length, grasps.problem.object_joint_model.planar, torsional
     )
@@ -54,7 +66,7 @@ def _wrenches(grasps: Grasps, friction: float, edges: int, length_unit: float | 
 
 @batched
 def ferrari_canny_epsilon(
-    grasps: Grasps, friction: float = 0.5, length_unit: float | None = None, edges: int | None = 8
+    grasps: Grasps, friction: float = FRICTION, length_unit: float | None = None, edges: int | None = EDGES
 ) -> Array:
     r"""Largest push and twist, from any side, that contacts with unit total normal force resist; 0 without closure.
 
@@ -83,18 +95,18 @@ def ferrari_canny_epsilon(
     Source: C. Ferrari, J. Canny, "Planning Optimal Grasps", ICRA 1992, with the normal forces' sum as the bound.
     """
     if edges is None and not grasps.problem.object_joint_model.planar:
-        axes = wrenches.contact_axes(*_contacts(grasps), _length(grasps, length_unit))
+        axes = wrenches.contact_axes(*_contacts(grasps), torque_divisor(grasps.problem, length_unit))
         return wrenches.round_ball_radius(axes, friction)
-    return wrenches.ball_radius(_wrenches(grasps, friction, 8 if edges is None else edges, length_unit))
+    return wrenches.ball_radius(_wrenches(grasps, friction, EDGES if edges is None else edges, length_unit))
 
 
 @batched
 def soft_finger_epsilon(
     grasps: Grasps,
-    friction: float = 0.5,
-    torsional: float = 0.005,
+    friction: float = FRICTION,
+    torsional: float = TORSIONAL,
     length_unit: float | None = None,
-    edges: int = 8,
+    edges: int = EDGES,
 ) -> Array:
     """The epsilon of :func:`ferrari_canny_epsilon` with soft fingers, the index for grippers with two flat pads.
 
@@ -123,7 +135,7 @@ def soft_finger_epsilon(
 
 @batched
 def ferrari_canny_volume(
-    grasps: Grasps, friction: float = 0.5, length_unit: float | None = None, edges: int = 8
+    grasps: Grasps, friction: float = FRICTION, length_unit: float | None = None, edges: int = EDGES
 ) -> Array:
     """Volume of the hull of all contact wrenches, unit total normal force; 0 without force closure.
 
@@ -152,7 +164,7 @@ def ferrari_canny_volume(
 
 
 @batched
-def min_weight(grasps: Grasps, friction: float = 0.5, edges: int = 8) -> Array:
+def min_weight(grasps: Grasps, friction: float = FRICTION, edges: int = EDGES) -> Array:
     r"""Least share of any friction-cone edge in internal forces that use all edges, from 0, no closure, to 1.
 
     .. math:: w \max \{ l \;:\; \sum_j \alpha_j w_j = 0, \; \sum_j \alpha_j = 1, \; \alpha_j \ge l \}
@@ -198,7 +210,7 @@ def grasp_isotropy(grasps: Grasps, length_unit: float | None = None) -> Array:
     """
     G = grasps.G.copy()
     forces = grasps.problem.object_joint_model.translations
-    G[:, forces:] /= _length(grasps, length_unit)
+    G[:, forces:] /= torque_divisor(grasps.problem, length_unit)
     sigma = np.linalg.svd(G, compute_uv=False)[:, : G.shape[1]]
     if sigma.shape[1] < G.shape[1]:
         return np.zeros(len(grasps))

@@ -7,16 +7,19 @@ from typing import ClassVar
 
 import numpy as np
 
+from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasps
+from graspatlas.problem.problem import Problem
 from graspatlas.quality.force_closure import force_closure_slack
-from graspatlas.quality.holding_force import GAP, holding_force
+from graspatlas.quality.holding_force import GAP, holding_force, holding_limits
 from graspatlas.requirements.base import Requirement, Slacks
 from graspatlas.support.arrays import Array, BoolArray
 
 __all__ = ["HoldingForce"]
 
-#: Relative difference from the largest force up to which grasps are screened; they are never thought too strong.
+#: Relative difference from the largest force up to which grasps are screened, before those in doubt are looked at
+#: again; they are never thought too strong.
 SCREENING_GAP = 0.01
 
 
@@ -56,8 +59,17 @@ class HoldingForce(Requirement):
         return ":".join([self.name, *(f"{value:g}" for value in values)])
 
     def met(self, grasps: Grasps) -> BoolArray:
-        """Whether each grasp meets the requirement (n,), one that exceeds it by less than a hundredth perhaps not."""
-        return np.asarray(self._forces(grasps, SCREENING_GAP) >= self.at_least)
+        """Whether each grasp meets the requirement (n,), one that exceeds it by less than 1e-5 of it perhaps not."""
+        forces = self._forces(grasps, SCREENING_GAP)
+        doubtful = (forces < self.at_least) & (forces >= (1.0 - 2.0 * SCREENING_GAP) * self.at_least)
+        if doubtful.any():
+            forces[doubtful] = self._forces(Grasps(grasps.problem, grasps.x[doubtful], grasps.system), GAP)
+        return np.asarray(forces >= self.at_least)
+
+    def measures(self, problem: Problem, system: _core.GraspSystem) -> list[_core.Measure]:
+        """The force in each direction in which a grasp withstands least; see :meth:`Requirement.measures`."""
+        limits = holding_limits(problem, *self._limits)
+        return [_core.holding_measure(limits, self.at_least * (1.0 + GAP))]
 
     def slacks_near(self, grasp: Grasps) -> Slacks:
         """The holding force as a multiple of that asked for, less one; without closure less, by the closure's slack."""
@@ -72,6 +84,10 @@ class HoldingForce(Requirement):
 
         return slacks
 
+    @property
+    def _limits(self) -> tuple[float, float | None, float, float]:
+        """Friction, normal force, torsional friction and length that divides torques, as the index takes them."""
+        return self.friction, self.normal_force or None, self.torsional, self.torque_length
+
     def _forces(self, grasps: Grasps, gap: float) -> Array:
-        budget = self.normal_force or None
-        return holding_force(grasps, self.friction, budget, self.torsional, self.torque_length, gap=gap)
+        return holding_force(grasps, *self._limits, gap=gap)

@@ -39,10 +39,15 @@ def caption(result: GraspAtlas, exhibit: Exhibit) -> Caption:
     reach = ", ".join(f"{axis if axis > ROUNDING else 0.0:.3g}" for axis in axes)
     moves = max(axes) > ROUNDING
     return Caption(
-        title=f"{exhibit.name.capitalize()} grasp",
+        title=_title(result, exhibit),
         quality=f"{index_name(result)} {exhibit.grasp.quality:.3g}",
         motion=f"object moves {reach} mm per rad" if moves else "the joints do not move the object",
     )
+
+
+def _title(result: GraspAtlas, exhibit: Exhibit) -> str:
+    free = result.refinement is not None and result.refinement.all_motions
+    return f"{exhibit.name.capitalize()} grasp" + (", all motions free" if free and exhibit.name == "best" else "")
 
 
 def index_name(result: GraspAtlas) -> str:

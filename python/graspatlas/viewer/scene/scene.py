@@ -117,7 +117,9 @@ class Scene:
         self.result = result
         shapes = BodyShapes(result.problem)
         best = result.refined_best if result.refinement else result.best
-        grasps = [("best", best), ("worst", result.worst)][: 2 if worst else 1]
+        grasps = [("best", best)]
+        if worst and result.accepted.any():
+            grasps.append(("worst", result.worst))
         size = size_of(body_parts(shapes, best))
         sides = [(name, grasp, *grasp_parts(shapes, grasp, size)) for name, grasp in grasps]
         subjects = [subject_of(parts, grasp, size) for _, grasp, parts, _ in sides]

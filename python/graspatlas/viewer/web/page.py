@@ -183,7 +183,7 @@ def _captions(scene: Scene, camera: Camera, with_legend: bool) -> Iterator[Comma
     middles = [float(points[:, 0].min() + points[:, 0].max()) / 2.0 for points in seen]
     bottom = min(float(points[:, 1].min()) for points in seen)
     images = [caption_image(caption(scene.result, exhibit), LETTERS) for exhibit in scene.exhibits]
-    widest = CAPTION_WIDTH * (middles[1] - middles[0])
+    widest = CAPTION_WIDTH * (middles[1] - middles[0] if len(middles) > 1 else 2.0 * half[0])
     visible = 2.0 * camera.distance * np.tan(camera.field_of_view / 2.0)
     pixel = min(widest / max(image.width for image in images), CAPTION_HEIGHT * visible / images[0].height)
     height = pixel * images[0].height
@@ -192,7 +192,7 @@ def _captions(scene: Scene, camera: Camera, with_legend: bool) -> Iterator[Comma
         yield set_object(f"{ROOT}/{exhibit.name}/caption", sprite(png_bytes(image), place, pixel * image.width, height))
     if with_legend:
         image = legend_image(legend(), 0.5 * LETTERS)
-        middle = (middles[0] + middles[1]) / 2.0
+        middle = sum(middles) / len(middles)
         place = camera.target + np.array([middle, bottom - 1.4 * height]) @ camera.axes[:2]
         yield set_object(f"{ROOT}/legend", sprite(png_bytes(image), place, pixel * image.width, pixel * image.height))
 
