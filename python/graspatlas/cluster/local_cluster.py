@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING
 
 from graspatlas.errors import GraspAtlasError
@@ -49,6 +51,21 @@ def _empty_folder() -> Iterator[None]:
             os.chdir(here)
 
 
+@contextmanager
+def _deaf_to_ctrl_c() -> Iterator[None]:
+    """Keep Ctrl-C, which a terminal sends to all its processes, from workers: they are told to end.
+
+    Threads inherit what signals are blocked, and so do the processes that they start, now or later. This thread hears
+    of a Ctrl-C after the block.
+    """
+    resource_tracker.ensure_running()  # it lets Ctrl-C through again in the thread that starts it
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def local_cluster(workers: int) -> dask.LocalCluster:
     """Workers on this machine, in the current folder: processes of one thread each.
 
@@ -61,7 +78,7 @@ def local_cluster(workers: int) -> dask.LocalCluster:
     import dask.distributed as dask
 
     try:
-        with nullcontext() if KNOWS_SAFE_PATH else _empty_folder():
+        with _deaf_to_ctrl_c(), nullcontext() if KNOWS_SAFE_PATH else _empty_folder():
             cluster = dask.LocalCluster(
                 n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs="ERROR"
             )

@@ -83,9 +83,9 @@ class NumberedTasks(Generic[T]):
     def _wanted(self) -> int:
         """How many tasks to keep submitted."""
         try:
-            threads = sum(self.client.nthreads().values())
-        except OSError as error:
-            raise self._lost(error) from None
+            threads: int = sum(self.client.nthreads().values())
+        except OSError:
+            raise self._lost() from None
         return max(AHEAD * threads, LEAST_AHEAD)
 
     def _submit(self, number: int, batch: str, deadline: float) -> dask.Future:
@@ -102,8 +102,8 @@ class NumberedTasks(Generic[T]):
             dask.wait(running, timeout=seconds, return_when="FIRST_COMPLETED")
         except TimeoutError:
             pass
-        except CancelledError as error:
-            raise self._lost(error) from None
+        except CancelledError:
+            raise self._lost() from None
 
     def _result(self, number: int, future: dask.Future) -> T:
         import dask.distributed as dask
@@ -112,8 +112,8 @@ class NumberedTasks(Generic[T]):
             found: T = future.result()
         except GraspAtlasError:
             raise
-        except CancelledError as error:
-            raise self._lost(error) from None
+        except CancelledError:
+            raise self._lost() from None
         except dask.KilledWorker as error:
             raise GraspAtlasError(
                 f"{self.what} {number} was given up after {error.allowed_failures + 1} workers died one after another "
@@ -132,6 +132,7 @@ class NumberedTasks(Generic[T]):
         if futures and self.client.status == "running":
             self.client.cancel(futures)
 
-    def _lost(self, error: Exception) -> GraspAtlasError:
-        said = " ".join(str(error).split())
-        return GraspAtlasError(f"the Dask scheduler went away ({said}); start it again, and what ran on it")
+    def _lost(self) -> GraspAtlasError:
+        return GraspAtlasError(
+            f"the Dask scheduler went away, or somebody cancelled the {self.what}s; start it again, and then this"
+        )

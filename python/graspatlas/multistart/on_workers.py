@@ -60,7 +60,7 @@ def sealed(plan: Plan) -> bytes:
     """
     import cloudpickle
 
-    parts = {f"the index {quality_name(plan.quality)}": plan.quality}
+    parts: dict[str, object] = {f"the index {quality_name(plan.quality)}": plan.quality}
     parts.update({f"the requirement {requirement_name(each)}": each for each in plan.requirements})
     for name, part in parts.items():
         try:
