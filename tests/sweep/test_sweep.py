@@ -133,7 +133,7 @@ def test_the_command_line_sweeps(tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 
 def test_wrong_input_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("graspatlas.sweep.workers.ANSWER_SECONDS", 1.0)
+    monkeypatch.setattr("graspatlas.cluster.client.ANSWER_SECONDS", 1.0)
     with pytest.raises(ga.GraspAtlasError, match="quality index 'beauty'"):
         run_sweep(["planar_hand"], tmp_path, qualities=["beauty"])
     with pytest.raises(ga.GraspAtlasError, match="at least one problem"):

@@ -51,13 +51,23 @@ class Ends:
 
 @dataclass(frozen=True)
 class Objective:
-    """What is maximised: the index over the grasps of a system that meet the requirements."""
+    """What is maximised: the index over the grasps of a system that meet the requirements.
+
+    Attributes:
+        problem: The problem.
+        system: Its system.
+        quality: The index.
+        requirements: What grasps must meet.
+        radius: Largest entry of the first step of a climb [units of the tangent space].
+        threads: Threads on which climbs run; all cores by default.
+    """
 
     problem: Problem
     system: _core.GraspSystem
     quality: Quality
     requirements: tuple[RequirementLike, ...]
     radius: float
+    threads: int | None = None
 
     @classmethod
     def of(cls, result: GraspAtlas, all_motions: bool) -> Objective:
@@ -87,7 +97,7 @@ class Objective:
         return np.asarray(_core.missed(self.system, X, measures))
 
     def climbs(self, X: Array, max_steps: int, max_seconds: float | None = None, radius: float | None = None) -> Ends:
-        """Climbs from grasps on the manifold, on all cores.
+        """Climbs from grasps on the manifold, many at a time.
 
         Args:
             X: The grasps [n, configuration_size].
@@ -98,4 +108,4 @@ class Objective:
         index = index_measure(self.quality, self.problem, self.system, X)
         measures = requirement_measures(self.requirements, self.problem, self.system)
         trust_radius = self.radius if radius is None else radius
-        return Ends(**_core.climbs(self.system, X, index, measures, trust_radius, max_steps, max_seconds))
+        return Ends(**_core.climbs(self.system, X, index, measures, trust_radius, max_steps, max_seconds, self.threads))

@@ -108,6 +108,8 @@ def _add_limits(best: argparse.ArgumentParser) -> None:
         help="search for other connected components too, and take the best grasp over all of them; --max-seconds then "
         "limits the whole search",
     )
+    best.add_argument("--workers", type=int, metavar="N", help="with --motions all: processes that share the search")
+    best.add_argument("--scheduler", metavar="ADDRESS", help="the same on the workers of a Dask scheduler")
     best.add_argument("--threads", type=int, metavar="N", help="threads to use, all cores by default; same result")
 
 
@@ -130,9 +132,11 @@ def _optimize(options: argparse.Namespace) -> int:
     if options.components and options.motions == "all":
         raise GraspAtlasError("a search over all motions looks into all components: leave --components out")
     if options.components:
+        if options.workers is not None or options.scheduler is not None:
+            raise GraspAtlasError("components are searched in this process: leave --workers and --scheduler out")
         return _report_components(find_components(problem, **given, require=require, progress=True), options, folder)
     checkpoint = folder / "checkpoint" if folder else None
-    search = {name: getattr(options, name) for name in ("motions", "share_missing", "seed")}
+    search = {name: getattr(options, name) for name in ("motions", "share_missing", "seed", "workers", "scheduler")}
     result = optimize(problem, **given, **search, require=require, checkpoint=checkpoint, progress=True)
     if folder:
         result.save(folder / "result.npz")

@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from graspatlas.quality.batched import Quality
 from graspatlas.requirements.base import RequirementLike
 from graspatlas.search.grasp_search import GraspSearch
 from graspatlas.support.arrays import Array, BoolArray
+from graspatlas.support.pickling import Light
 
 __all__ = ["FIRST_STEP", "Plan", "Round", "RoundKind", "climbed", "run_round"]
 
@@ -53,7 +55,7 @@ class RoundKind(str, Enum):
 
 
 @dataclass(frozen=True)
-class Plan:
+class Plan(Light):
     """What a search over all feasible grasps maximises, and the numbers that fix it.
 
     Attributes:
@@ -65,6 +67,7 @@ class Plan:
         epsilon: See :func:`graspatlas.build_atlas`.
         seed: Of the random numbers.
         max_steps: Steps after which a climb is given up.
+        threads: Threads on which climbs run; all cores by default. They find the same, whatever it is.
     """
 
     problem: Problem
@@ -75,12 +78,13 @@ class Plan:
     epsilon: float
     seed: int = 0
     max_steps: int = MAX_STEPS
+    threads: int | None = None
 
-    @property
+    @cached_property
     def objective(self) -> Objective:
         """The index over all feasible grasps that meet the requirements."""
         system = self.problem.system(self.problem.largest_dimension)
-        return Objective(self.problem, system, self.quality, self.requirements, FIRST_STEP)
+        return Objective(self.problem, system, self.quality, self.requirements, FIRST_STEP, self.threads)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing
 from functools import partial
 
 import numpy as np
+from tqdm import tqdm
 
 from graspatlas.analysis.objective import Objective
 from graspatlas.analysis.unbounded import Around, levels_around, never_levels_off, rises_towards_one_point
@@ -34,11 +36,12 @@ EMPTY_ROUNDS = 40
 #: Climbs from around a maximum that has not converged.
 POLISH_CLIMBS = 8
 
-#: Yields the rounds of a plan from a number on, in their order, until it is closed.
-Source = Callable[[Plan, int, float], Iterator[Round]]
+#: Yields the rounds of a plan from a number on, in their order, until it is closed or a reading of
+#: ``time.perf_counter`` has passed.
+Source = Callable[[Plan, int, float], Generator[Round, None, None]]
 
 
-def one_by_one(plan: Plan, first: int, deadline: float) -> Iterator[Round]:
+def one_by_one(plan: Plan, first: int, deadline: float) -> Generator[Round, None, None]:
     """The rounds of a plan in this process, each on all cores; see :data:`Source`."""
     for number in range(first, MOST_ROUNDS + 1):
         left = deadline - time.perf_counter()
@@ -88,7 +91,6 @@ class Search:
         """
         start = time.perf_counter()
         deadline = deadline_after(max_seconds)
-        status = SearchEnd.ROUNDS
         bar = progress_bar("search", "climbs", progress=self.progress)
         try:
             for kept in self.folder.load() if self.folder else ():
@@ -97,18 +99,8 @@ class Search:
                 left = None if max_seconds is None else max(deadline - time.perf_counter(), 1e-3)
                 self._keep(climbed(self.plan, self.objective, 0, RoundKind.STATED, starts, 0, 0, start, left))
             bar.update(self.census.climbs)
-            rounds = source(self.plan, self.rounds, deadline)
-            while True:
-                ended = self._ended(deadline)
-                if ended is not None:
-                    status = ended
-                    break
-                new = next(rounds, None)
-                if new is None:
-                    break
-                self._keep(new)
-                bar.update(len(new.x))
-                self._tell(bar.set_postfix_str)
+            with closing(source(self.plan, self.rounds, deadline)) as rounds:
+                status = self._follow(rounds, deadline, bar)
         except KeyboardInterrupt:
             status = SearchEnd.INTERRUPTED
         finally:
@@ -116,6 +108,19 @@ class Search:
                 bar.close()
         with held():
             return self._refinement(status, time.perf_counter() - start)
+
+    def _follow(self, rounds: Iterator[Round], deadline: float, bar: tqdm[None]) -> SearchEnd:
+        """Count rounds until the search ends; why it does."""
+        while True:
+            ended = self._ended(deadline)
+            if ended is not None:
+                return ended
+            new = next(rounds, None)
+            if new is None:
+                return self._ended(deadline) or SearchEnd.ROUNDS
+            self._keep(new)
+            bar.update(len(new.x))
+            self._tell(bar.set_postfix_str)
 
     def _keep(self, new: Round) -> None:
         if self.folder:

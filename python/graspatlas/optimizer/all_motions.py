@@ -10,19 +10,23 @@ import numpy as np
 
 from graspatlas.analysis.objective import Objective
 from graspatlas.analysis.peaks import local_maxima
+from graspatlas.cluster.client import need
 from graspatlas.errors import GraspAtlasError
+from graspatlas.multistart.on_workers import OnWorkers
 from graspatlas.multistart.rounds import Plan
-from graspatlas.multistart.search import Search
+from graspatlas.multistart.search import Search, one_by_one
 from graspatlas.multistart.search import nothing_meets as no_grasp_meets
 from graspatlas.problem.problem import Problem
 from graspatlas.result.result import Result
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import checked_instance, number, shown, whole
 
-__all__ = ["check_motions", "slice_dimension", "with_best_of_all"]
+__all__ = ["check_motions", "check_workers", "slice_dimension", "with_best_of_all"]
 
 #: Dimension of the atlas where the problem has no default.
 DIMENSION = 2
+#: Most workers that are started on this machine.
+MOST_WORKERS = 1024
 #: Charts from which to climb, the best first.
 MOST_STARTS = 40
 
@@ -49,6 +53,28 @@ def check_motions(motions: object, dimension: int | None, refine: bool | str, sh
         raise GraspAtlasError("motions 'all' climbs in all of F already: leave refine out")
 
 
+def check_workers(motions: str, workers: int | None, scheduler: str | None) -> None:
+    """Make sure that what is asked to do the rounds of a search can.
+
+    Raises:
+        GraspAtlasError: If it cannot.
+    """
+    if workers is None and scheduler is None:
+        return
+    if motions != "all":
+        raise GraspAtlasError(
+            "workers and a scheduler share the search over all hand motions: add motions='all', or leave them out; for "
+            "many problems or options see graspatlas sweep"
+        )
+    if workers is not None and scheduler is not None:
+        raise GraspAtlasError("give workers of this machine or the address of a scheduler, not both")
+    if workers is not None:
+        whole(workers, "workers", most=MOST_WORKERS)
+    elif not isinstance(scheduler, str) or not scheduler:
+        raise GraspAtlasError(f"scheduler must be an address such as 'tcp://10.0.0.1:8786', got {shown(scheduler)}")
+    need("a search on workers", "dask.distributed")
+
+
 def slice_dimension(problem: Problem) -> int:
     """Dimension of the atlas from which a search over all motions starts: the problem's default, or 2.
 
@@ -72,6 +98,9 @@ def with_best_of_all(
     seed: int,
     max_steps: int,
     max_seconds: float | None,
+    threads: int,
+    workers: int | None,
+    scheduler: str | None,
     checkpoint: str | os.PathLike[str] | None,
     progress: bool | None,
 ) -> Result:
@@ -83,11 +112,15 @@ def with_best_of_all(
         seed: Of the random numbers.
         max_steps: Steps after which a climb is given up.
         max_seconds: Time after which the search ends; none by default.
+        threads: Threads of this process on which climbs run.
+        workers: Processes on this machine that do the rounds; None for this one alone.
+        scheduler: Address of a Dask scheduler whose workers do them.
         checkpoint: Folder of the atlas's checkpoint, in which the search keeps its own.
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
     Raises:
-        GraspAtlasError: If no climb met the requirements, or the checkpoint is of another search.
+        GraspAtlasError: If no climb met the requirements, the checkpoint is of another search, or workers fail; see
+            :class:`graspatlas.multistart.on_workers.OnWorkers`.
     """
     plan = Plan(
         problem=result.problem,
@@ -98,10 +131,12 @@ def with_best_of_all(
         epsilon=result.atlas.epsilon,
         seed=seed,
         max_steps=max_steps,
+        threads=threads,
     )
     folder = None if checkpoint is None else Path(checkpoint) / "rounds"
     search = Search(plan, share, folder, progress)
-    found = search.run(_starts(result), max_seconds)
+    alone = workers is None and scheduler is None
+    found = search.run(_starts(result), max_seconds, one_by_one if alone else OnWorkers(workers, scheduler))
     if found is None:
         raise no_grasp_meets(plan, search.census)
     return replace(result, refinement=found)

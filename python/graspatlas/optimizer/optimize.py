@@ -16,7 +16,7 @@ from graspatlas.atlas.build import grown
 from graspatlas.atlas.limits import LimitOptions, Limits
 from graspatlas.errors import GraspAtlasError
 from graspatlas.multistart.search import SHARE
-from graspatlas.optimizer.all_motions import check_motions, slice_dimension, with_best_of_all
+from graspatlas.optimizer.all_motions import check_motions, check_workers, slice_dimension, with_best_of_all
 from graspatlas.optimizer.options import several_indices, with_defaults
 from graspatlas.optimizer.readings import Reading, check_atlas_of
 from graspatlas.problem.problem import Problem
@@ -48,6 +48,8 @@ def optimize(
     motions: str = "relevant",
     share_missing: float = SHARE,
     seed: int = 0,
+    workers: int | None = None,
+    scheduler: str | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: bool | None = None,
     atlas: Atlas | None = None,
@@ -79,6 +81,10 @@ def optimize(
         share_missing: With all motions, the largest share of climbs that may end at maxima not found; see
             :class:`graspatlas.SearchReport`.
         seed: Of the search's random numbers: the same seed finds the same, whatever the number of threads.
+        workers: With all motions, share the search among so many processes on this machine; the same result. In a
+            script, call it below ``if __name__ == "__main__":``.
+        scheduler: With all motions, the same among the workers of a Dask scheduler at this address, such as
+            ``"tcp://10.0.0.1:8786"``.
         checkpoint: See :func:`build_atlas`.
         progress: See :func:`build_atlas`.
         atlas: An atlas of the same problem and options to read instead of tracing one: that of another result, or the
@@ -100,6 +106,7 @@ def optimize(
     """
     limit = Limits.of(limits, "optimize")
     check_motions(motions, dimension, refine, share_missing, seed)
+    check_workers(motions, workers, scheduler)
     if motions == "all":
         dimension = slice_dimension(problem)
     options = with_defaults(problem, dimension=dimension, radius=radius, epsilon=epsilon, quality=quality)
@@ -127,6 +134,9 @@ def optimize(
                     seed=seed,
                     max_steps=refine_steps,
                     max_seconds=seconds_until(limit.deadline, _SHORTEST) if np.isfinite(limit.deadline) else None,
+                    threads=limit.threads,
+                    workers=workers,
+                    scheduler=scheduler,
                     checkpoint=checkpoint,
                     progress=progress,
                 )

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from graspatlas.cluster.client import need
 from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.requirement import parse_requirement
 from graspatlas.quality.evaluation import find_index
@@ -113,7 +114,7 @@ def run_sweep(
             scheduler does not answer. A problem that cannot be loaded or solved is no error but a row that says so.
     """
     folder = writable_folder(output)
-    _need_dask()
+    need("a sweep", "dask.distributed", "pyarrow.parquet")
     for quality in qualities:
         find_index(quality)
     for text in require:
@@ -146,11 +147,3 @@ def run_sweep(
             write_rows(path, rows)
     ended = [rows[key] for key in runs if key in rows]
     return Sweep(path, ended, skipped, len(runs) - len(ended))
-
-
-def _need_dask() -> None:
-    try:
-        import dask.distributed  # noqa: F401
-        import pyarrow.parquet  # noqa: F401
-    except ImportError as error:
-        raise GraspAtlasError(f"a sweep needs {error.name}: pip install 'graspatlas[sweep]'") from None
