@@ -41,5 +41,6 @@ void bind_atlas(pybind11::module_& module);
 void bind_grasp(pybind11::module_& module);
 void bind_quality(pybind11::module_& module);
 void bind_collision(pybind11::module_& module);
+void bind_render(pybind11::module_& module);
 
 }  // namespace graspatlas

@@ -29,4 +29,5 @@ PYBIND11_MODULE(_core, module) {
   graspatlas::bind_grasp(module);
   graspatlas::bind_quality(module);
   graspatlas::bind_collision(module);
+  graspatlas::bind_render(module);
 }

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import minimize
 
 from graspatlas import _core
 from graspatlas.grasps.grasps import Grasps
@@ -112,6 +111,8 @@ class LocalModel:
 
     def optimise(self) -> tuple[Array, float] | None:
         """What SLSQP finds, or something on the way there, if it is better."""
+        from scipy.optimize import minimize  # slow to import
+
         k = len(self.Phi)
         limits = {"type": "ineq", "fun": lambda w: self.evaluate(w[None])[1][0], "jac": lambda w: self.slopes(w)[1]}
         found = minimize(

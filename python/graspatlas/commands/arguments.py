@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.result.result import Result
 from graspatlas.support.validation import shown
+
+if TYPE_CHECKING:
+    from graspatlas.result.result import Result
 
 __all__ = ["Subcommands", "chart_named", "path_word"]
 

@@ -14,10 +14,10 @@ from graspatlas.problems import load_problem
 from graspatlas.support.files import replaced
 from graspatlas.support.terminal import say
 
-__all__ = ["add_problem_commands"]
+__all__ = ["add_commands"]
 
 
-def add_problem_commands(commands: Subcommands) -> None:
+def add_commands(commands: Subcommands) -> None:
     """Add new, check and schema to the subcommands of a parser."""
     new = commands.add_parser("new", help="write a commented problem file for a hand, to be filled in")
     new.add_argument(
