@@ -32,7 +32,7 @@ EXTRAS = {
     "dask": "sweep",
     "pyarrow": "sweep",
     "pandas": "tables",
-    "ipywidgets": "notebook",
+    "jupyterlab": "notebook",
     "robot_descriptions": "hands",
 }
 #: Variables of the environment that change what is loaded, and how many threads work.
