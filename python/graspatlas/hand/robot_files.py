@@ -26,7 +26,7 @@ def robots_folder() -> Path:
 @lru_cache(maxsize=1)
 def _example_share() -> Path | None:
     """Folder that holds the package example-robot-data, or None when it is not installed."""
-    shares = (Path(place) / "cmeel.prefix" / "share" for place in sys.path)
+    shares = [*(Path(place) / "cmeel.prefix" / "share" for place in sys.path), Path(sys.prefix) / "share"]  # pip, conda
     return next((share for share in shares if (share / "example-robot-data").is_dir()), None)
 
 
