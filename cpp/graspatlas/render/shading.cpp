@@ -20,15 +20,18 @@ constexpr float kKnee = 0.7f;  // light above this saturates
 constexpr float kGamma = 2.2f;
 constexpr double kBlurReach = 4.0;  // a Gauss function ends after so many sigma
 
+/// The pixel at a place within a picture's side; the nearest one for a place beyond, the first for one that is none.
+int pixel_at(double place, int side) { return place > 0.0 ? static_cast<int>(std::min(place, side - 1.0)) : 0; }
+
 /// Share of the lamp that reaches a point with a unit normal, with a soft edge.
 float lit(const ShadowMap& map, const Vector3f& point, const Vector3f& normal) {
   const Vector3d raised = map.axes * (point.cast<double>() + kLift * normal.cast<double>()) - map.origin;
   const double x = raised.x() / map.pixel, y = raised.y() / map.pixel;
   int reached = 0;
   for (const double dy : kTaps) {
-    const int row = std::clamp(static_cast<int>(y + dy), 0, map.height - 1);
+    const int row = pixel_at(y + dy, map.height);
     for (const double dx : kTaps) {
-      const int column = std::clamp(static_cast<int>(x + dx), 0, map.width - 1);
+      const int column = pixel_at(x + dx, map.width);
       reached += map.depths[static_cast<std::int64_t>(row) * map.width + column] < raised.z();
     }
   }
@@ -62,9 +65,9 @@ Vector3f light_of(const Vector3f& colour, const Vector3f& normal, const Vector3f
 
 /// Screen colour of linear light, 0 to 255.
 std::uint8_t screen_colour(float light) {
+  if (!(light > 0.0f)) return 0;
   if (light > kKnee) light = kKnee + (1.0f - kKnee) * (1.0f - std::exp(-(light - kKnee) / (1.0f - kKnee)));
-  return static_cast<std::uint8_t>(
-      std::lround(255.0f * std::clamp(std::pow(std::max(light, 0.0f), 1.0f / kGamma), 0.0f, 1.0f)));
+  return static_cast<std::uint8_t>(std::lround(255.0f * std::min(std::pow(light, 1.0f / kGamma), 1.0f)));
 }
 
 /// Weights of a Gauss function from its middle outwards; with their mirror images they sum to one.
