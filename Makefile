@@ -10,7 +10,7 @@ $(BIN)/pybind11-stubgen graspatlas._core --output-dir $(1) --numpy-array-use-typ
 $(BIN)/ruff format --quiet --config pyproject.toml $(1)/graspatlas/_core.pyi
 endef
 
-.PHONY: demo test test-slow sanitize bench compare lint stubs format clean
+.PHONY: demo test test-slow sanitize bench compare lint stubs format wheel clean
 
 demo: $(VENV)/.installed
 	$(BIN)/graspatlas optimize schunk_can --require force_closure:0.5:0.02 --require collision_free --refine --output out/schunk_can
@@ -60,6 +60,23 @@ format: $(VENV)/.tools
 stubs: $(VENV)/.tools
 	$(call stubs,python)
 
+# This platform's wheel, and what it must be: no larger than 4 MB, of sound metadata, and working in an environment of its
+# own, without a compiler or anything else but Python in reach and without the network when it runs.
+FRESH := build/fresh
+ALONE := env -i PATH=$(CURDIR)/$(FRESH)/bin HOME=$(CURDIR)/$(FRESH)
+wheel: $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet "build>=1.2" "twine>=7" "check-wheel-contents>=0.6"
+	rm -rf dist $(FRESH)
+	$(BIN)/python -m build --outdir dist
+	$(BIN)/twine check --strict dist/*
+	$(BIN)/check-wheel-contents dist/*.whl
+	test $$(wc -c < dist/*.whl) -le 4000000
+	$(PYTHON) -m venv $(FRESH)
+	$(ALONE) $(FRESH)/bin/python -m pip install --quiet $$(ls dist/*.whl)
+	! $(ALONE) $(FRESH)/bin/python -c "import shutil, sys; sys.exit(not any(map(shutil.which, ['c++', 'g++', 'clang++'])))"
+	$(ALONE) $(FRESH)/bin/graspatlas optimize schunk_can --require force_closure:0.5:0.02 --require collision_free --refine
+	$(ALONE) $(FRESH)/bin/python tests/wheel_smoke.py
+
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
@@ -73,4 +90,4 @@ $(VENV)/.tools: $(VENV)/bin/python $(SOURCES)
 	touch $@ $(VENV)/.installed
 
 clean:
-	rm -rf $(VENV) build out
+	rm -rf $(VENV) build dist out

@@ -1,3 +1,10 @@
+# /// script
+# requires-python = ">=3.10"
+# dependencies = ["graspatlas"]
+#
+# [tool.uv.sources]
+# graspatlas = { path = ".." }
+# ///
 """Hold a ball, a box or a cylinder with three or four fingers of the Allegro hand, as well as it can be held.
 
 Run it with ``python examples/allegro.py``, or name object and fingers: ``python examples/allegro.py box 3``. It writes

@@ -1,3 +1,10 @@
+# /// script
+# requires-python = ">=3.10"
+# dependencies = ["graspatlas"]
+#
+# [tool.uv.sources]
+# graspatlas = { path = ".." }
+# ///
 """Hold an egg with a BarrettHand, a hand whose joints are coupled: four motors turn eight joints.
 
 Hand, egg and problem are the files in ``examples/barrett``: a URDF without ``<mimic>``, whose couplings stand in

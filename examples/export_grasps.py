@@ -1,3 +1,10 @@
+# /// script
+# requires-python = ">=3.10"
+# dependencies = ["graspatlas"]
+#
+# [tool.uv.sources]
+# graspatlas = { path = ".." }
+# ///
 """Hand grasps on to a robot: where the palm must go, which joint angles close the hand, and the way between two grasps.
 
 Run it with ``python examples/export_grasps.py``; it writes CSV and JSON files to ``out/export_grasps``.

@@ -1,3 +1,10 @@
+# /// script
+# requires-python = ">=3.10"
+# dependencies = ["graspatlas"]
+#
+# [tool.uv.sources]
+# graspatlas = { path = ".." }
+# ///
 """Two figures of a result of your own: an atlas with its local maxima, and what a local optimiser makes of it.
 
 Run it with ``python examples/figures.py``; it writes three pictures to ``out/figures``. In a notebook a figure at the

@@ -1,3 +1,10 @@
+# /// script
+# requires-python = ">=3.10"
+# dependencies = ["graspatlas"]
+#
+# [tool.uv.sources]
+# graspatlas = { path = ".." }
+# ///
 """Hold a skittle with a parallel gripper: joints that mimic others, flat pads, soft fingers, and components.
 
 Run it with ``python examples/gripper.py``; it writes a picture, a page and the result to ``out/gripper``.

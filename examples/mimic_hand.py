@@ -1,3 +1,10 @@
+# /// script
+# requires-python = ">=3.10"
+# dependencies = ["graspatlas"]
+#
+# [tool.uv.sources]
+# graspatlas = { path = ".." }
+# ///
 """Hold a cup with an underactuated hand: eight joints, four motors, and a coupling of your own on top.
 
 Run it with ``python examples/mimic_hand.py``; it writes a picture, a page and the result to ``out/mimic_hand``.

@@ -1,3 +1,10 @@
+# /// script
+# requires-python = ">=3.10"
+# dependencies = ["graspatlas"]
+#
+# [tool.uv.sources]
+# graspatlas = { path = ".." }
+# ///
 """Hold a jar with a hand that graspatlas does not know, from its URDF to the best grasp; everything stated in Python.
 
 The hand is ``own_hand/three_fingers.urdf``, three fingers of four joints. ``own_hand/jar.yaml`` states the same problem

@@ -1,3 +1,10 @@
+# /// script
+# requires-python = ">=3.10"
+# dependencies = ["graspatlas"]
+#
+# [tool.uv.sources]
+# graspatlas = { path = ".." }
+# ///
 """Let the thumb's domed fingertip roll on the can, and see what it gains over a thumb that touches with a fixed point.
 
 The paper's contacts hold a fixed point of the hand against a region of the object. Here the thumb carries a region too:

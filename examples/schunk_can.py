@@ -1,3 +1,10 @@
+# /// script
+# requires-python = ">=3.10"
+# dependencies = ["graspatlas"]
+#
+# [tool.uv.sources]
+# graspatlas = { path = ".." }
+# ///
 """Find the best grasp of a can by the 13-joint Schunk hand, with an index of the paper and with one of your own.
 
 Run it with ``python examples/schunk_can.py``; it writes a picture, a page and the result to ``out/schunk_can``.

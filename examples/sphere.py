@@ -1,3 +1,10 @@
+# /// script
+# requires-python = ">=3.10"
+# dependencies = ["graspatlas"]
+#
+# [tool.uv.sources]
+# graspatlas = { path = ".." }
+# ///
 """Cover a sphere with charts, then an ellipsoid that is written in Python.
 
 Run it with ``python examples/sphere.py``; it needs nothing but graspatlas.

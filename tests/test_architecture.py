@@ -16,8 +16,8 @@ NAME = "graspatlas"
 
 #: The floors from the lowest to the highest: packages, and files that lie beside them. Each may import those below it.
 FLOORS = (
-    *("_core", "version", "errors", "start_up", "libraries"),
-    *("support", "cluster", "systems", "patches", "hand", "problem", "collision", "execution"),
+    *("_core", "version", "errors", "start_up", "libraries", "doctor"),
+    *("support", "numerics", "cluster", "systems", "patches", "hand", "problem", "collision", "execution"),
     *("atlas", "grasps", "search", "quality", "requirements"),
     *(
         "testing",

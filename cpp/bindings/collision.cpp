@@ -10,6 +10,7 @@
 
 #include "bindings.hpp"
 #include "graspatlas/collision/collision_batch.hpp"
+#include "graspatlas/collision/convex_hull.hpp"
 #include "graspatlas/errors.hpp"
 #include "graspatlas/parallel.hpp"
 
@@ -74,10 +75,14 @@ CollisionShape shape_from(const ShapeTuple& tuple) {
   return shape;
 }
 
-py::dict table_of(const LinkShape& shape) {
+Eigen::Matrix4d matrix_of(const Placement& placement) {
   Eigen::Matrix4d T = Eigen::Matrix4d::Identity();
-  T.topLeftCorner<3, 3>() = shape.placement.rotation;
-  T.topRightCorner<3, 1>() = shape.placement.translation;
+  T.topLeftCorner<3, 3>() = placement.rotation;
+  T.topRightCorner<3, 1>() = placement.translation;
+  return T;
+}
+
+py::dict table_of(const LinkShape& shape) {
   py::dict table;
   table["name"] = shape.name;
   table["kind"] = name_of(shape.kind);
@@ -85,10 +90,37 @@ py::dict table_of(const LinkShape& shape) {
   table["points"] = rows_of_three<double>(shape.points);
   table["triangles"] = rows_of_three<int>(shape.triangles);
   table["joint"] = shape.joint;
-  table["placement"] = T;
+  table["placement"] = matrix_of(shape.placement);
   table["link"] = shape.link;
   table["parent_joint"] = shape.parent_joint;
   return table;
+}
+
+/// The same of a shape to look at, with its colour and its file.
+py::dict table_of(const VisualShape& shape) {
+  py::dict table = table_of(static_cast<const LinkShape&>(shape));
+  table["in_link"] = matrix_of(shape.in_link);
+  table["at_rest"] = matrix_of(shape.at_rest);
+  table["colour"] = Eigen::Vector4d(shape.colour);
+  table["file"] = shape.file;
+  table["scale"] = Eigen::Vector3d(shape.scale);
+  return table;
+}
+
+using Tables = py::typing::List<py::typing::Dict<py::str, py::object>>;
+
+/// Tables of the shapes that a function of read_shapes.cpp reads.
+template <class Shapes>
+Tables tables_of(Shapes (*read)(const std::string&, const std::string&, const std::vector<std::string>&),
+                 const std::string& tree, const std::string& urdf, const std::vector<std::string>& package_dirs) {
+  Shapes shapes;
+  {
+    py::gil_scoped_release release;
+    shapes = read(tree, urdf, package_dirs);
+  }
+  Tables out;
+  for (const auto& shape : shapes) out.append(table_of(shape));
+  return out;
 }
 
 py::ssize_t checked_rows(const CollisionBatch& batch, const DoubleArray& X) {
@@ -212,17 +244,41 @@ void bind_collision(py::module_& module) {
   module.def(
       "read_collision_shapes",
       [](const std::string& tree, const std::string& urdf, const std::vector<std::string>& package_dirs) {
-        std::vector<LinkShape> shapes;
-        {
-          py::gil_scoped_release release;
-          shapes = read_collision_shapes(tree, urdf, package_dirs);
-        }
-        py::typing::List<py::typing::Dict<py::str, py::object>> out;
-        for (const LinkShape& shape : shapes) out.append(table_of(shape));
-        return out;
+        return tables_of(read_collision_shapes, tree, urdf, package_dirs);
       },
       py::arg("tree"), py::arg("urdf"), py::arg("package_dirs"),
       "Collision shapes of a URDF, each a table; see collision_shape.hpp.");
+  module.def(
+      "read_visual_shapes",
+      [](const std::string& tree, const std::string& urdf, const std::vector<std::string>& package_dirs) {
+        return tables_of(read_visual_shapes, tree, urdf, package_dirs);
+      },
+      py::arg("tree"), py::arg("urdf"), py::arg("package_dirs"),
+      "Shapes of a URDF to look at, each a table; see collision_shape.hpp.");
+  module.def(
+      "convex_hull",
+      [](const DoubleArray& points) {
+        const auto of = points_from(points);
+        for (const auto& point : of)
+          if (!point.allFinite()) throw Error("points must be finite numbers");
+        ConvexHull hull;
+        {
+          py::gil_scoped_release release;
+          hull = convex_hull_of(of);
+        }
+        py::array_t<double> planes = matrix<double>(static_cast<py::ssize_t>(hull.planes.size()), 4);
+        for (std::size_t i = 0; i < hull.planes.size(); ++i)
+          Eigen::Map<Eigen::Vector4d>(planes.mutable_data() + 4 * i) = hull.planes[i];
+        ArrayTable out;
+        out["corners"] = py::array_t<int>(static_cast<py::ssize_t>(hull.corners.size()), hull.corners.data());
+        out["triangles"] = rows_of_three<int>(hull.triangles);
+        out["planes"] = planes;
+        return out;
+      },
+      py::arg("points"),
+      "Convex hull of points [n x 3]: numbers of its corners, triangles of its surface [t x 3], and planes [f x 4]; "
+      "see "
+      "convex_hull.hpp.");
   module.def(
       "distances_from_hull",
       [](const DoubleArray& points, const DoubleArray& corners) {

@@ -30,4 +30,5 @@ PYBIND11_MODULE(_core, module) {
   graspatlas::bind_quality(module);
   graspatlas::bind_collision(module);
   graspatlas::bind_climb(module);
+  graspatlas::bind_render(module);
 }

@@ -39,32 +39,42 @@ __all__: list[str] = [
     "available_threads",
     "axes_measure",
     "ball_radii",
+    "blurred",
     "box_half_width",
     "centrality_measure",
     "climbs",
     "closure_index_measure",
     "closure_measure",
     "contact_forces",
+    "convex_hull",
+    "corner_normals",
+    "developed",
     "distances_from_hull",
     "distances_measure",
+    "enlarged",
     "epsilon_measure",
     "force_closure_margins",
     "force_closure_slacks",
+    "fragments_in_front",
     "holding_forces",
     "holding_index_measure",
     "holding_measure",
     "hull_volumes",
     "joint_margin_measure",
+    "lay_over",
     "measured",
     "min_weights",
     "missed",
+    "nearest_fragments",
     "numbers_measure",
     "project",
     "project_far",
     "read_collision_shapes",
+    "read_visual_shapes",
     "resisted_loads",
     "round_ball_radii",
     "semi_axes",
+    "shaded",
     "slacks_measure",
     "test_measure",
 ]
@@ -742,6 +752,13 @@ def ball_radii(
     Radius of the largest ball around the origin in the hull of each grasp's wrenches [n x points x 3 or 6]; see wrench_hull.hpp.
     """
 
+def blurred(
+    picture: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], sigma: typing.SupportsFloat | typing.SupportsIndex
+) -> numpy.typing.NDArray[numpy.float32]:
+    """
+    A picture [h x w] blurred by a Gauss function of so many pixels, mirrored at its edges.
+    """
+
 def box_half_width(
     dimension: typing.SupportsInt | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex
 ) -> float:
@@ -793,6 +810,32 @@ def contact_forces(
     Contact forces on the object of each grasp that stay farthest from their friction cones: forces [n x m x 3] and torques about the normals into the object [n x m], world axes, for a total normal force of one; joint_torques of the actuated joints [n x a], and margin [n]. Loads [n x object_dof] are wrenches at the object's origin to balance. NaN where the margin is 0. See force_closure.hpp.
     """
 
+def convex_hull(
+    points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]]:
+    """
+    Convex hull of points [n x 3]: numbers of its corners, triangles of its surface [t x 3], and planes [f x 4]; see convex_hull.hpp.
+    """
+
+def corner_normals(
+    points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    triangles: typing.Annotated[numpy.typing.ArrayLike, numpy.int64],
+    crease: typing.SupportsFloat | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Unit normals at the corners of triangles [t x 3 x 3]; see corner_normals.hpp.
+    """
+
+def developed(
+    picture: typing.Annotated[numpy.typing.ArrayLike, numpy.float32],
+    width: typing.SupportsInt | typing.SupportsIndex,
+    height: typing.SupportsInt | typing.SupportsIndex,
+    samples: typing.SupportsInt | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.uint8]:
+    """
+    Screen colours [h x w x 3] of linear light; see shading.hpp.
+    """
+
 def distances_from_hull(
     points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     corners: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -804,6 +847,15 @@ def distances_from_hull(
 def distances_measure(batch: CollisionBatch) -> Measure:
     """
     Distances of hand and object.
+    """
+
+def enlarged(
+    picture: typing.Annotated[numpy.typing.ArrayLike, numpy.float32],
+    width: typing.SupportsInt | typing.SupportsIndex,
+    height: typing.SupportsInt | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.float32]:
+    """
+    A picture [h x w x channels] at another size, bilinear.
     """
 
 def epsilon_measure(
@@ -836,6 +888,16 @@ def force_closure_slacks(
     Force-closure margin of each grasp with its sign [n]; -infinity where there are no internal forces. See force_closure.hpp.
     """
 
+def fragments_in_front(
+    corners: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    width: typing.SupportsInt | typing.SupportsIndex,
+    height: typing.SupportsInt | typing.SupportsIndex,
+    nearness: typing.Annotated[numpy.typing.ArrayLike, numpy.float32],
+) -> dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]]:
+    """
+    All of triangles that is nearer than a picture's pixels; see raster.hpp.
+    """
+
 def holding_forces(
     system: GraspSystem, X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], limits: HoldingLimits
 ) -> numpy.typing.NDArray[numpy.float64]:
@@ -865,6 +927,16 @@ def joint_margin_measure(distance: typing.SupportsFloat | typing.SupportsIndex) 
     Distances of the joints from their limits beyond one that is asked for.
     """
 
+def lay_over(
+    picture: numpy.typing.NDArray[numpy.float32],
+    pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.int64],
+    opacities: typing.Annotated[numpy.typing.ArrayLike, numpy.float32],
+    light: typing.Annotated[numpy.typing.ArrayLike, numpy.float32],
+) -> None:
+    """
+    Lays fragments over a picture [pixels x 3], which is changed; see shading.hpp.
+    """
+
 def measured(
     system: GraspSystem,
     x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -889,6 +961,15 @@ def missed(
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     By how much each grasp of X misses the requirement that it misses most, in about units of the tangent space [n]; infinite where a requirement that is met or not is not met.
+    """
+
+def nearest_fragments(
+    corners: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    width: typing.SupportsInt | typing.SupportsIndex,
+    height: typing.SupportsInt | typing.SupportsIndex,
+) -> dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]]:
+    """
+    What is seen of triangles [f x 3 x 3] at each pixel of a picture; see raster.hpp.
     """
 
 def numbers_measure(
@@ -924,6 +1005,13 @@ def read_collision_shapes(
     Collision shapes of a URDF, each a table; see collision_shape.hpp.
     """
 
+def read_visual_shapes(
+    tree: str, urdf: str, package_dirs: collections.abc.Sequence[str]
+) -> list[dict[str, typing.Any]]:
+    """
+    Shapes of a URDF to look at, each a table; see collision_shape.hpp.
+    """
+
 def resisted_loads(
     system: GraspSystem,
     X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -948,6 +1036,32 @@ def semi_axes(
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Ascending semi-axes of the manipulability ellipsoid of each grasp [n x object_dof]; see manipulability.hpp.
+    """
+
+def shaded(
+    points: typing.Annotated[numpy.typing.ArrayLike, numpy.float32],
+    normals: typing.Annotated[numpy.typing.ArrayLike, numpy.float32],
+    nearness: typing.Annotated[numpy.typing.ArrayLike, numpy.float32],
+    colours: typing.Annotated[numpy.typing.ArrayLike, numpy.float32],
+    triangles: typing.Annotated[numpy.typing.ArrayLike, numpy.int64],
+    weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float32],
+    camera: typing.Annotated[numpy.typing.ArrayLike, numpy.float32, "[3, 1]"],
+    lamps: collections.abc.Sequence[
+        tuple[
+            typing.Annotated[numpy.typing.ArrayLike, numpy.float32, "[3, 1]"],
+            typing.SupportsFloat | typing.SupportsIndex,
+        ]
+    ],
+    shadow: tuple[
+        typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"],
+        typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+        typing.SupportsFloat | typing.SupportsIndex,
+        typing.Annotated[numpy.typing.ArrayLike, numpy.float32],
+    ]
+    | None,
+) -> tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]]:
+    """
+    Light [n x 3] of fragments, and how squarely they face the camera [n]; see shading.hpp.
     """
 
 def slacks_measure(

@@ -3,30 +3,35 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import signal
 import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NoReturn
 
-from graspatlas.commands.analysis import add_analysis_commands
-from graspatlas.commands.exit_status import INTERRUPTED, MISUSE
-from graspatlas.commands.ladder import add_ladder_command
-from graspatlas.commands.optimize import add_optimize_command
-from graspatlas.commands.problem import add_problem_commands
-from graspatlas.commands.reproduce import add_reproduce_command
-from graspatlas.commands.result import add_result_commands
-from graspatlas.commands.simulate import add_simulate_command
-from graspatlas.commands.sweep import add_sweep_command
+from graspatlas.commands.arguments import INTERRUPTED, MISUSE
 from graspatlas.errors import GraspAtlasError
 from graspatlas.start_up import hear_interrupts
 from graspatlas.support.interrupts import stoppable, stopped_by
 from graspatlas.support.terminal import finish_output, printable, say, shortened, silence_output
-from graspatlas.version import __version__
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
 __all__ = ["main"]
+
+#: Modules of ``commands`` and the commands that they add, in the order in which help lists them.
+COMMANDS = {
+    "listing": ("list", "doctor"),
+    "problem": ("new", "check", "schema"),
+    "optimize": ("optimize",),
+    "ladder": ("ladder",),
+    "result": ("view", "export", "check-result"),
+    "analysis": ("pareto", "densify", "path"),
+    "simulate": ("simulate",),
+    "sweep": ("sweep",),
+    "reproduce": ("reproduce",),
+}
 
 #: Requests to end, besides Ctrl-C: of a cluster whose time is up, and of a terminal that is closed.
 _REQUESTS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
@@ -61,7 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(arguments: Sequence[str] | None) -> int:
     """Run a command; its exit status."""
     try:
-        options = _parser().parse_args(arguments)
+        words = sys.argv[1:] if arguments is None else list(arguments)
+        options = parser_for(words).parse_args(words)
         return int(options.run(options))
     except SystemExit:  # help is printed, or a word is wrong
         finish_output()
@@ -94,19 +100,31 @@ class _Parser(argparse.ArgumentParser):
         self.exit(MISUSE, line + "\n")
 
 
-def _parser() -> argparse.ArgumentParser:
+class _Version(argparse.Action):
+    """Prints the versions of the package and of what it stands on."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str) -> None:
+        super().__init__(option_strings, argparse.SUPPRESS, nargs=0, help="show versions and exit")
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        from graspatlas.doctor import versions  # slow to import
+
+        say(versions())
+        parser.exit()
+
+
+def parser_for(words: Sequence[str]) -> argparse.ArgumentParser:
+    """The parser of a command line: it knows the command that comes first, and all of them where none does."""
     parser: argparse.ArgumentParser = _Parser(
         prog="graspatlas",
         description="Find the globally best grasp of an object by a robotic hand when the contacts are given.",
     )
-    parser.add_argument("--version", action="version", version=f"graspatlas {__version__}")
+    parser.add_argument("--version", action=_Version)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    for add in (
-        *(add_problem_commands, add_optimize_command, add_ladder_command, add_result_commands, add_analysis_commands),
-        *(add_simulate_command, add_sweep_command, add_reproduce_command),
-    ):
-        add(commands)
+    named = [module for module, names in COMMANDS.items() if words and words[0] in names]
+    for module in named or COMMANDS:
+        importlib.import_module(f"graspatlas.commands.{module}").add_commands(commands)
     return parser
 
 

@@ -10,7 +10,7 @@ import signal
 import sys
 import threading
 
-__all__ = ["hear_interrupts", "started_as_program"]
+__all__ = ["hear_interrupts", "is_command", "started_as_program"]
 
 _PROGRAM = "graspatlas"
 
@@ -22,6 +22,11 @@ def started_as_program() -> bool:
         after = [word for flag, word in zip(sys.orig_argv, sys.orig_argv[1:], strict=False) if flag == "-m"]
         return after[:1] == [_PROGRAM] or after[:1] == [f"{_PROGRAM}.cli"]
     return os.path.splitext(os.path.basename(words[0]))[0] == _PROGRAM
+
+
+def is_command(name: str) -> bool:
+    """True when this is the program and was started for one of its commands."""
+    return started_as_program() and list(getattr(sys, "argv", None) or [])[1:2] == [name]
 
 
 def _end_at_once() -> bool:

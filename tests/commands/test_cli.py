@@ -17,6 +17,7 @@ import pytest
 
 import graspatlas as ga
 from graspatlas.cli import main
+from graspatlas.libraries import PINS
 
 COMMAND = [sys.executable, "-m", "graspatlas.cli"]
 QUICK = ["optimize", "schunk_oil_bottle", "--radius", "0.2"]
@@ -334,7 +335,20 @@ def test_as_a_program(tmp_path):
 
 
 def test_version(cli):
-    assert cli("--version") == (0, f"graspatlas {ga.__version__}\n", "")
+    status, out, err = cli("--version")
+    assert (status, err) == (0, "")
+    assert out.startswith(f"graspatlas {ga.__version__} (Python ")
+    assert f"libpinocchio {PINS['libpinocchio']}" in out
+
+
+def test_doctor(cli):
+    status, out, err = cli("doctor", "--json")
+    findings = {finding["subject"]: finding for finding in json.loads(out)}
+    assert (status, err) == (0, "")
+    assert findings["compiled core"] == {"mark": "ok", "subject": "compiled core", "text": "it loads"}
+    assert findings["numpy"] == {"mark": "ok", "subject": "numpy", "text": np.__version__}
+    assert findings["threads"]["text"].endswith("processors may be used")
+    assert cli("doctor")[1].splitlines()[0].startswith("ok      graspatlas ")
 
 
 def test_wrong_words_give_one_line(capsys):

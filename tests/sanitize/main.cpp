@@ -11,6 +11,7 @@ int main() {
   const Part parts[] = {
       {"polytopes", strain::polytopes}, {"neighbours", strain::neighbours}, {"fronts", strain::fronts},
       {"atlases", strain::atlases},     {"misuse", strain::misuse},         {"users", strain::users},
+      {"pictures", strain::pictures},
 #ifdef GRASPATLAS_WITH_GRASPS
       {"grasps", strain::grasps},       {"collisions", strain::collisions},
 #endif

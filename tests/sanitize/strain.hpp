@@ -70,5 +70,6 @@ void misuse();
 void neighbours();
 void polytopes();
 void users();
+void pictures();
 
 }  // namespace strain

@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 from screens import pixels, share
 
 import graspatlas as ga
+from graspatlas import _core
 from graspatlas.viewer import export_html, save_picture
 from graspatlas.viewer.render.picture import WINDOW
-from graspatlas.viewer.render.raster import nearest
-from graspatlas.viewer.render.shading import to_linear, to_screen
+from graspatlas.viewer.render.raster import in_front_of, nearest
+from graspatlas.viewer.render.shading import to_linear
 from graspatlas.viewer.scene.scene import Scene, vertices_of
 
 Array = NDArray[np.float64]
@@ -63,9 +65,66 @@ def test_rasteriser_takes_nothing() -> None:
 
 
 def test_colours_survive_light() -> None:
-    dark = np.linspace(0.0, 0.8, 9)
-    assert_allclose(to_screen(to_linear(dark)), dark, atol=1e-12)
-    assert to_screen(np.array([1e6])) == pytest.approx(1.0)
+    dark = np.arange(200)
+    light = np.repeat(to_linear(dark / 255.0), 3).reshape(-1, 3)
+    assert (_core.developed(light, 200, 1, 1)[0] == dark[:, None]).all()
+    assert (_core.developed(np.full((1, 3), 1e6), 1, 1, 1) == 255).all()
+
+
+def test_a_pixel_is_the_mean_of_its_samples() -> None:
+    light = np.random.default_rng(5).uniform(0.0, 0.6, (6, 8, 3))
+    means = light.reshape(3, 2, 4, 2, 3).mean(axis=(1, 3))
+    alone = _core.developed(means.reshape(-1, 3), 4, 3, 1)
+    assert np.abs(_core.developed(light.reshape(-1, 3), 4, 3, 2).astype(int) - alone).max() <= 1
+
+
+def test_fragments_in_front_come_from_back_to_front() -> None:
+    random = np.random.default_rng(7)
+    corners = random.uniform(-10.0, 70.0, (40, 3, 3))
+    all_of_them = in_front_of(np.full(64 * 48, -np.inf, np.float32), corners, 64, 48)
+    order = np.lexsort((all_of_them.nearness, all_of_them.pixels))
+    assert (order == np.arange(len(order))).all()
+    last = np.flatnonzero(np.diff(all_of_them.pixels, append=-1))
+    seen = nearest(corners, 64, 48)
+    assert (all_of_them.pixels[last] == seen.pixels).all()
+    assert (all_of_them.triangles[last] == seen.triangles).mean() > 0.999
+    depth = np.full(64 * 48, -np.inf, np.float32)
+    depth[seen.pixels] = seen.nearness + 0.5
+    assert len(in_front_of(depth, corners, 64, 48).pixels) == 0
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
+def test_corners_far_away_cover_nothing_wrong(bad: float) -> None:
+    corners = np.array([[[bad, 1.0, 1.0], [9.0, 1.0, 1.0], [5.0, 9.0, 1.0]]])
+    found = nearest(corners, 10, 10)
+    assert ((found.pixels >= 0) & (found.pixels < 100)).all()
+
+
+def test_blur_is_that_of_scipy() -> None:
+    image = np.random.default_rng(2).uniform(size=(31, 17)).astype(np.float32)
+    for sigma in (0.4, 1.5, 20.0):
+        assert_allclose(_core.blurred(image, sigma), gaussian_filter(image, sigma), atol=2e-6)
+
+
+def test_enlarging_keeps_planes() -> None:
+    """Bilinear between the middles of pixels; beyond those at the edge it is constant."""
+    x = (np.arange(8) + 0.5) / 8.0
+    image = np.stack([x + 2.0 * x[:, None], 0.0 * x + x[:, None]], axis=-1)
+    large = _core.enlarged(image, 32, 16)
+    u, v = (np.clip((np.arange(n) + 0.5) / n, x[0], x[-1]) for n in (32, 16))
+    assert_allclose(large[..., 0], u + 2.0 * v[:, None], atol=1e-6)
+    assert_allclose(large[..., 1], np.repeat(v[:, None], 32, axis=1), atol=1e-6)
+
+
+def test_normals_are_averaged_within_the_crease() -> None:
+    points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    faces = [[0, 2, 1], [0, 1, 3]]  # at right angles
+    flat = np.repeat([[[0.0, 0.0, -1.0]], [[0.0, -1.0, 0.0]]], 3, axis=1)
+    assert_allclose(_core.corner_normals(points, faces, 1.0), flat, atol=1e-15)
+    half = np.array([0.0, -1.0, -1.0]) / np.sqrt(2.0)
+    assert_allclose(_core.corner_normals(points, faces, 2.0)[:, 0], [half, half], atol=1e-15)
+    with pytest.raises(ga.GraspAtlasError, match="triangles must be below 4"):
+        _core.corner_normals(points, [[0, 1, 4]], 1.0)
 
 
 def test_picture_shows_hand_and_object_on_both_sides(picture: Array) -> None:

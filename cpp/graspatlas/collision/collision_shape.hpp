@@ -38,4 +38,17 @@ struct LinkShape : CollisionShape {
 std::vector<LinkShape> read_collision_shapes(const std::string& tree, const std::string& urdf,
                                              const std::vector<std::string>& package_dirs);
 
+/// A shape to look at, as a URDF states it.
+struct VisualShape : LinkShape {
+  Eigen::Vector4d colour = Eigen::Vector4d::Ones();  ///< red, green, blue, opacity, each 0 to 1
+  Placement in_link;                                 ///< of the shape in its link
+  Placement at_rest;                                 ///< in the root, all joints at 0
+  std::string file;                                  ///< of a mesh
+  Eigen::Vector3d scale = Eigen::Vector3d::Ones();   ///< of the mesh in it
+};
+
+/// Reads the shapes of a URDF that are to be seen, or its collision shapes where it has none; see above.
+std::vector<VisualShape> read_visual_shapes(const std::string& tree, const std::string& urdf,
+                                            const std::vector<std::string>& package_dirs);
+
 }  // namespace graspatlas

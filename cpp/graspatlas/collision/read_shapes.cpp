@@ -4,8 +4,10 @@
 #include <coal/shape/convex.h>
 #include <coal/shape/geometric_shapes.h>
 
+#include <map>
 #include <pinocchio/multibody.hpp>
 #include <pinocchio/parsers/urdf.hpp>
+#include <tuple>
 
 #include "graspatlas/collision/collision_shape.hpp"
 #include "graspatlas/errors.hpp"
@@ -14,10 +16,17 @@ namespace graspatlas {
 
 namespace {
 
-/// Reads the triangles of a mesh, without the tree of boxes over them that only collisions need.
+/// Reads the triangles of each mesh once, without the tree of boxes over them that only collisions need.
 class TriangleLoader : public coal::MeshLoader {
  public:
   coal::BVHModelPtr_t load(const std::string& filename, const coal::Vec3s& scale) override {
+    coal::BVHModelPtr_t& model = read_[{filename, scale.x(), scale.y(), scale.z()}];
+    if (!model) model = read(filename, scale);
+    return model;
+  }
+
+ private:
+  static coal::BVHModelPtr_t read(const std::string& filename, const coal::Vec3s& scale) {
     coal::internal::Loader file;
     file.load(filename);
     coal::internal::TriangleAndVertices mesh;
@@ -27,6 +36,8 @@ class TriangleLoader : public coal::MeshLoader {
     model->addSubModel(mesh.vertices_, mesh.triangles_);
     return model;
   }
+
+  std::map<std::tuple<std::string, double, double, double>, coal::BVHModelPtr_t> read_;
 };
 
 void take_mesh(const coal::BVHModelBase& mesh, CollisionShape& shape) {
@@ -71,29 +82,61 @@ std::string reason_of(const std::exception& error) {
   return at == std::string::npos ? text : text.substr(at + mark.size());
 }
 
-}  // namespace
-
-std::vector<LinkShape> read_collision_shapes(const std::string& tree, const std::string& urdf,
-                                             const std::vector<std::string>& package_dirs) {
+/// A URDF's joints and frames, and its geometry of a kind.
+struct Tree {
   pinocchio::Model model;
   pinocchio::GeometryModel geometry;
+};
+
+Tree read_tree(const std::string& tree, const std::string& urdf, const std::vector<std::string>& package_dirs,
+               pinocchio::GeometryType kind) {
+  Tree out;
   try {
-    pinocchio::urdf::buildModelFromXML(tree, model);
-    pinocchio::urdf::buildGeom(model, std::istringstream(urdf), pinocchio::COLLISION, geometry, package_dirs,
+    pinocchio::urdf::buildModelFromXML(tree, out.model);
+    pinocchio::urdf::buildGeom(out.model, std::istringstream(urdf), kind, out.geometry, package_dirs,
                                std::make_shared<TriangleLoader>());
   } catch (const std::exception& error) {
     throw Error(reason_of(error));
   }
-  std::vector<LinkShape> shapes;
-  for (const pinocchio::GeometryObject& object : geometry.geometryObjects) {
-    LinkShape shape;
-    shape.name = object.name;
-    shape.link = model.frames[object.parentFrame].name;
-    shape.joint = static_cast<int>(object.parentJoint);
-    shape.parent_joint = static_cast<int>(model.parents[object.parentJoint]);
-    shape.placement = {object.placement.rotation(), object.placement.translation()};
-    take_geometry(*object.geometry, shape);
-    shapes.push_back(std::move(shape));
+  return out;
+}
+
+void take_object(const pinocchio::GeometryObject& object, const pinocchio::Model& model, LinkShape& shape) {
+  shape.name = object.name;
+  shape.link = model.frames[object.parentFrame].name;
+  shape.joint = static_cast<int>(object.parentJoint);
+  shape.parent_joint = static_cast<int>(model.parents[object.parentJoint]);
+  shape.placement = {object.placement.rotation(), object.placement.translation()};
+  take_geometry(*object.geometry, shape);
+}
+
+}  // namespace
+
+std::vector<LinkShape> read_collision_shapes(const std::string& tree, const std::string& urdf,
+                                             const std::vector<std::string>& package_dirs) {
+  const Tree read = read_tree(tree, urdf, package_dirs, pinocchio::COLLISION);
+  std::vector<LinkShape> shapes(read.geometry.geometryObjects.size());
+  for (std::size_t i = 0; i < shapes.size(); ++i) take_object(read.geometry.geometryObjects[i], read.model, shapes[i]);
+  return shapes;
+}
+
+std::vector<VisualShape> read_visual_shapes(const std::string& tree, const std::string& urdf,
+                                            const std::vector<std::string>& package_dirs) {
+  Tree read = read_tree(tree, urdf, package_dirs, pinocchio::VISUAL);
+  if (read.geometry.geometryObjects.empty()) read = read_tree(tree, urdf, package_dirs, pinocchio::COLLISION);
+  std::vector<VisualShape> shapes(read.geometry.geometryObjects.size());
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    const pinocchio::GeometryObject& object = read.geometry.geometryObjects[i];
+    take_object(object, read.model, shapes[i]);
+    const pinocchio::SE3 in_link = read.model.frames[object.parentFrame].placement.actInv(object.placement);
+    shapes[i].in_link = {in_link.rotation(), in_link.translation()};
+    pinocchio::SE3 at_rest = object.placement;
+    for (auto joint = object.parentJoint; joint > 0; joint = read.model.parents[joint])
+      at_rest = read.model.jointPlacements[joint] * at_rest;
+    shapes[i].at_rest = {at_rest.rotation(), at_rest.translation()};
+    shapes[i].colour = object.meshColor;
+    shapes[i].file = object.meshPath;
+    shapes[i].scale = object.meshScale;
   }
   return shapes;
 }

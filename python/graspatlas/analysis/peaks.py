@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from graspatlas.analysis.climb import Climb
+from graspatlas.numerics.groups import linked_groups
 from graspatlas.result.grasp_atlas import GraspAtlas, check_is_result
 from graspatlas.support.arrays import Array, IntArray
 
@@ -35,9 +34,8 @@ def local_maxima(result: GraspAtlas) -> IntArray:
     atlas, q = result.atlas, np.where(result.accepted, result.qualities, -np.inf)
     i, j = atlas.neighbour_pairs.T
     equal = q[i] == q[j]
-    graph = coo_array((np.ones(equal.sum()), (i[equal], j[equal])), shape=(atlas.n_charts, atlas.n_charts))
-    n_groups, group = connected_components(graph, directed=False)
-    beaten = np.zeros(n_groups, bool)
+    group = linked_groups(atlas.n_charts, atlas.neighbour_pairs[equal])
+    beaten = np.zeros(group.max(initial=-1) + 1, bool)
     beaten[group[i[q[i] < q[j]]]] = True
     beaten[group[j[q[j] < q[i]]]] = True
     first = np.unique(group, return_index=True)[1]
@@ -84,9 +82,9 @@ def peaks_of(result: GraspAtlas, climbs: Sequence[Climb]) -> list[Peak]:
     for i in range(n):
         for j in range(i + 1, n):
             near[i, j] = np.linalg.norm(difference(climbs[i].x, climbs[j].x)) <= SAME_PEAK * result.atlas.radius
-    n_groups, group = connected_components(coo_array(near), directed=False)
+    group = linked_groups(n, np.argwhere(near))
     peaks = []
-    for number in range(n_groups):
+    for number in range(group.max() + 1):
         members = np.flatnonzero(group == number)
         top = max((climbs[int(m)] for m in members), key=lambda c: c.quality)
         peaks.append(Peak(top.quality, members, top.x, all(climbs[int(m)].converged for m in members), top.unbounded))

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import nnls
-from scipy.spatial import ConvexHull, cKDTree
 
 from graspatlas import _core
 from graspatlas.atlas.status import Audit, Closed, Status
@@ -25,6 +23,7 @@ from graspatlas.systems.system import AnySystem
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+    from scipy.spatial import cKDTree
 
 __all__ = ["BOX_TAG", "Atlas"]
 
@@ -221,6 +220,8 @@ class Atlas(Light):
     @cached_property
     def volumes(self) -> Array:
         """k-dimensional volume of each chart's polytope [n]."""
+        from scipy.spatial import ConvexHull  # slow to import
+
         if self.dimension == 1:
             return np.array([np.ptp(self.polytope(i)) for i in range(self.n_charts)])
         return np.array([ConvexHull(self.polytope(i)).volume for i in range(self.n_charts)])
@@ -235,6 +236,8 @@ class Atlas(Light):
 
     @cached_property
     def _index(self) -> cKDTree:
+        from scipy.spatial import cKDTree  # slow to import
+
         return cKDTree(np.array([self.system.embed(x) for x in self.centers]))
 
     def locate(self, x: ArrayLike) -> tuple[int, float]:
@@ -355,6 +358,8 @@ def shortest_way(normals: Array, excess: Array) -> Array:
     Source: C. L. Lawson and R. J. Hanson, "Solving Least Squares Problems", Chapter 23: least-distance programming as a
     non-negative least-squares problem.
     """
+    from scipy.optimize import nnls  # slow to import
+
     A = np.vstack([-normals.T, excess[None]])
     goal = np.zeros(len(A))
     goal[-1] = 1.0

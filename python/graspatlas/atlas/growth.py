@@ -97,7 +97,7 @@ class Growth:
                     builder.expand(limits.charts, seconds)
                 if shown and now - start > QUIET_SECONDS:
                     size = self.expected_size(seconds)
-                    bar.set_postfix_str(outlook(builder, size, time.perf_counter() - start), refresh=False)
+                    bar.note(outlook(builder, size, time.perf_counter() - start))
                 bar.update(builder.n_charts - bar.n)
                 after_slice()
         except KeyboardInterrupt:

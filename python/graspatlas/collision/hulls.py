@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from graspatlas import _core
+from graspatlas.errors import GraspAtlasError
 from graspatlas.support.arrays import Array, IndexArray, Int32Array
 
-__all__ = ["corners_of_hull", "mesh_volume", "shallow_volume"]
+__all__ = ["Hull", "corners_of_hull", "hull_of", "mesh_volume", "shallow_volume"]
 
 #: Hulls with at most this many corners stay as they are; coal's corners have at most 255 neighbours.
 FEW_CORNERS = 250
@@ -20,6 +22,45 @@ ENOUGH = 0.7 * LARGEST_ERROR
 MANY_POINTS = 20000
 #: Products of points and planes that are in memory at a time.
 AT_A_TIME = 1 << 20
+
+
+@dataclass(frozen=True, eq=False)
+class Hull:
+    """The convex hull of points.
+
+    Attributes:
+        points: The points (n, 3), metres.
+        corners: Numbers of those that are corners, ascending [c].
+        triangles: Its surface: numbers of points (t, 3).
+        planes: Its faces (f, 4): unit outward normal n and b of n x + b <= 0.
+    """
+
+    points: Array
+    corners: IndexArray
+    triangles: Int32Array
+    planes: Array
+
+    @property
+    def volume(self) -> float:
+        """Its volume [m^3]."""
+        a, b, c = (self.points[corner] - self.points[self.corners].mean(axis=0) for corner in self.triangles.T)
+        return float(np.abs(np.einsum("nc,nc->n", np.cross(a, b), c)).sum()) / 6.0
+
+    @property
+    def area(self) -> float:
+        """The area of its surface [m^2]."""
+        a, b, c = (self.points[corner] for corner in self.triangles.T)
+        return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+
+def hull_of(points: Array) -> Hull:
+    """The convex hull of points (n, 3), by Qhull.
+
+    Raises:
+        GraspAtlasError: If they have no volume, are too few, or not numbers.
+    """
+    found = _core.convex_hull(points)
+    return Hull(points, np.asarray(found["corners"], np.intp), found["triangles"], found["planes"])
 
 
 def corners_of_hull(points: Array) -> tuple[Array, float]:
@@ -35,11 +76,10 @@ def corners_of_hull(points: Array) -> tuple[Array, float]:
         The corners (c, 3), and a distance within which all points are from their hull [m]: 0 where nothing was thinned.
 
     Raises:
-        scipy.spatial.QhullError: If the points have no volume.
-        ValueError: If they are too few, or not numbers.
+        GraspAtlasError: If the points have no volume, are too few, or not numbers.
     """
     if len(points) <= MANY_POINTS:
-        points = points[ConvexHull(points).vertices]
+        points = points[hull_of(points).corners]
         if len(points) <= FEW_CORNERS:
             return points, 0.0
     chosen = _chosen(points)
@@ -57,9 +97,9 @@ def _chosen(points: Array) -> IndexArray:
     """Numbers of the corners of a hull above the faces of which no point is high, of a sample of the points."""
     chosen, waiting = _outermost(points), np.arange(0, len(points), 1 + len(points) // MANY_POINTS)
     while True:
-        hull = ConvexHull(points[chosen])
-        chosen = chosen[hull.vertices]
-        waiting, more = _farthest(points, waiting, hull.equations)
+        hull = hull_of(points[chosen])
+        chosen = chosen[hull.corners]
+        waiting, more = _farthest(points, waiting, hull.planes)
         if len(more) == 0 or len(chosen) >= MOST_CORNERS:
             return np.asarray(chosen, np.intp)
         chosen = np.union1d(chosen, more)
@@ -67,7 +107,7 @@ def _chosen(points: Array) -> IndexArray:
 
 def _corners(points: Array, chosen: IndexArray) -> IndexArray:
     """Those of the chosen points that are corners of their hull."""
-    return np.asarray(chosen[ConvexHull(points[chosen]).vertices], np.intp)
+    return np.asarray(chosen[hull_of(points[chosen]).corners], np.intp)
 
 
 def _outermost(points: Array) -> IndexArray:
@@ -75,9 +115,9 @@ def _outermost(points: Array) -> IndexArray:
     steps = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3)).reshape(3, -1).T
     found = np.unique((points @ steps[np.abs(steps).sum(axis=1) > 0.0].T).argmax(axis=0))
     try:
-        ConvexHull(points[found])
-    except (QhullError, ValueError):  # all in one plane, but the points are not
-        return np.asarray(ConvexHull(points).vertices, np.intp)
+        hull_of(points[found])
+    except GraspAtlasError:  # all in one plane, but the points are not
+        return hull_of(points).corners
     return np.asarray(found, np.intp)
 
 

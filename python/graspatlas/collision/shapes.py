@@ -13,17 +13,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import linprog
-from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from graspatlas import _core
-from graspatlas.collision.hulls import MANY_POINTS, corners_of_hull, mesh_volume, shallow_volume
+from graspatlas.collision.hulls import MANY_POINTS, corners_of_hull, hull_of, mesh_volume, shallow_volume
+from graspatlas.errors import GraspAtlasError
 from graspatlas.support.arrays import Array, Int32Array
 
 __all__ = ["Shape", "convex_hull", "convex_solid", "read_shapes", "thinner"]
 
 #: A mesh is convex when it has the volume of its hull but for this share.
 CONVEX = 1e-3
+#: A point is well inside a solid when its distances from the faces differ by no more than this factor.
+DEEP = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,21 +121,39 @@ def thinner(shape: Shape, depth: float) -> Shape | None:
 
 def _thinner_solid(shape: Shape, depth: float) -> Shape | None:
     """A convex solid whose faces are moved inwards."""
-    planes = ConvexHull(shape.points).equations  # n x + b <= 0
-    planes[:, 3] += depth
+    try:
+        planes = hull_of(shape.points).planes
+        planes[:, 3] += depth
+        inside = _point_inside(planes, shape.points.mean(axis=0))
+        return None if inside is None else _hull_of(replace(shape, points=_corners_of_planes(planes, inside)))
+    except GraspAtlasError:
+        return None
+
+
+def _point_inside(planes: Array, guess: Array) -> Array | None:
+    """A point (3,) well inside the planes n x + b <= 0 (f, 4): the guess, or the deepest; None where there is none."""
+    depths = -(planes[:, :3] @ guess + planes[:, 3])
+    if depths.min() > DEEP * depths.max():
+        return guess
+    from scipy.optimize import linprog  # slow to import
+
     # The point that is deepest inside, and how deep: max d with n x + b + d <= 0.
     deepest = linprog([0, 0, 0, -1], np.c_[planes[:, :3], np.ones(len(planes))], -planes[:, 3], bounds=(None, None))
-    if not deepest.success or deepest.x[3] <= 0.0:
-        return None
-    left = replace(shape, points=HalfspaceIntersection(planes, deepest.x[:3]).intersections)
-    return _hull_of(left)
+    return np.asarray(deepest.x[:3]) if deepest.success and deepest.x[3] > 0.0 else None
+
+
+def _corners_of_planes(planes: Array, inside: Array) -> Array:
+    """Corners (c, 3) of what lies below planes n x + b <= 0 (f, 4), round a point inside: faces of the dual hull."""
+    distances = -(planes[:, :3] @ inside + planes[:, 3])
+    dual = hull_of(planes[:, :3] / distances[:, None]).planes
+    return np.asarray(inside - dual[:, :3] / dual[:, 3:])
 
 
 def _hull_of(shape: Shape) -> Shape | None:
     """Convex hull of a shape's points, thinned where they are many; None when they have no volume."""
     try:
         corners, error = corners_of_hull(np.asarray(shape.points, float))
-    except (QhullError, ValueError):
+    except GraspAtlasError:
         return None
     error += shape.error
     return replace(shape, kind="convex", points=corners, triangles=np.zeros((0, 3), np.int32), error=error)
@@ -142,11 +161,11 @@ def _hull_of(shape: Shape) -> Shape | None:
 
 def _is_convex(mesh: Shape, hull: Shape) -> bool:
     """Whether a closed mesh fills its hull, but for the share CONVEX of its volume."""
-    whole, filled = ConvexHull(hull.points), mesh_volume(mesh.points, mesh.triangles)
+    whole, filled = hull_of(hull.points), mesh_volume(mesh.points, mesh.triangles)
     if len(mesh.points) <= MANY_POINTS:
-        volume = ConvexHull(mesh.points).volume
+        volume = hull_of(mesh.points).volume
         return bool(abs(filled - volume) <= CONVEX * volume)
     # The exact hull of so many points takes seconds: count what lies below the surface of the thinned one.
-    missing = shallow_volume(mesh.points, mesh.triangles, whole.equations)
+    missing = shallow_volume(mesh.points, mesh.triangles, whole.planes)
     beyond = hull.error * whole.area
     return bool(missing <= CONVEX * whole.volume and abs(filled - whole.volume) <= CONVEX * whole.volume + beyond)

@@ -11,8 +11,7 @@ import numpy as np
 
 from graspatlas.analysis.densify import Samples, densify
 from graspatlas.analysis.pareto import knee, pareto_front, values_of
-from graspatlas.commands.arguments import Subcommands, chart_named, path_word
-from graspatlas.commands.exit_status import FAILED, INTERRUPTED
+from graspatlas.commands.arguments import FAILED, INTERRUPTED, Subcommands, chart_named, path_word
 from graspatlas.errors import GraspAtlasError
 from graspatlas.paths.path import GraspPath
 from graspatlas.paths.shortest_path import shortest_path
@@ -22,10 +21,10 @@ from graspatlas.result.result import Result, load_result
 from graspatlas.support.files import replaced, writable_folder
 from graspatlas.support.terminal import say
 
-__all__ = ["add_analysis_commands"]
+__all__ = ["add_commands"]
 
 
-def add_analysis_commands(commands: Subcommands) -> None:
+def add_commands(commands: Subcommands) -> None:
     """Add pareto, densify and path to the subcommands of a parser."""
     front = commands.add_parser("pareto", help="list the grasps that no other beats in two indices")
     front.add_argument("result", type=path_word, help="folder or file that optimize wrote")

@@ -1,16 +1,25 @@
-"""Words of the command line, turned into what they mean or refused: paths, charts of a result."""
+"""Words of the command line, turned into what they mean or refused; and exit statuses, of which 0 is success."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.result.result import Result
 from graspatlas.support.validation import shown
 
-__all__ = ["Subcommands", "chart_named", "path_word"]
+if TYPE_CHECKING:
+    from graspatlas.result.result import Result
+
+__all__ = ["FAILED", "INTERRUPTED", "MISUSE", "Subcommands", "chart_named", "path_word"]
+
+#: Exit status where no grasp meets the requirements, or a check fails.
+FAILED = 1
+#: That of wrong input.
+MISUSE = 2
+#: That of Ctrl-C, as shells report it.
+INTERRUPTED = 130
 
 #: Number of a chart [digits].
 LONGEST_NUMBER = 18

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from graspatlas.atlas.build import build_atlas
 from graspatlas.atlas.status import Status
@@ -115,6 +114,8 @@ def _found(problem: Problem) -> Finding:
     text, hint = "none given, but one is found", "x1 below is the one found"
     guess, x1 = problem.pose_guess, problem.x1
     if guess is not None and x1 is not None:
+        from scipy.spatial.transform import Rotation  # slow to import
+
         metres, angle = guess.offset(x1.object_xyz, Rotation.from_quat(x1.object_quat_xyzw))
         text += f", {1000.0 * metres:.3g} mm from the pose guess"
         text += f" and turned by {np.degrees(angle):.3g} degrees" if guess.quat_xyzw else ""

@@ -7,23 +7,22 @@ import json
 import sys
 
 from graspatlas.analysis.climb import MAX_STEPS
-from graspatlas.commands.arguments import Subcommands, path_word
-from graspatlas.commands.exit_status import FAILED, INTERRUPTED
+from graspatlas.commands.arguments import FAILED, INTERRUPTED, Subcommands, path_word
 from graspatlas.errors import GraspAtlasError
 from graspatlas.optimizer.ladder import CHARTS, MAX_SECONDS, ladder
 from graspatlas.optimizer.ladder_outcome import Ladder, LadderStatus
-from graspatlas.problem.requirement import parse_requirement
 from graspatlas.problems import load_problem
 from graspatlas.quality.evaluation import INDICES
+from graspatlas.requirements.named import parse_requirement
 from graspatlas.support.files import replaced, writable_folder
 from graspatlas.support.terminal import say
 
-__all__ = ["add_ladder_command"]
+__all__ = ["add_commands"]
 
 PICTURES = (".png", ".pdf", ".svg")
 
 
-def add_ladder_command(commands: Subcommands) -> None:
+def add_commands(commands: Subcommands) -> None:
     """Add ladder to the subcommands of a parser."""
     steps = commands.add_parser("ladder", help="find the best grasp for k = 2, 3, ...: what each hand motion is worth")
     steps.add_argument("problem", help="name of a bundled problem, or path of a problem file (YAML)")

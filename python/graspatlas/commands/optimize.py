@@ -10,25 +10,24 @@ from pathlib import Path
 from graspatlas.analysis.climb import MAX_STEPS
 from graspatlas.atlas.checkpoints import CheckpointFolder
 from graspatlas.atlas.status import Status
-from graspatlas.commands.arguments import Subcommands, path_word
-from graspatlas.commands.exit_status import FAILED, INTERRUPTED
+from graspatlas.commands.arguments import FAILED, INTERRUPTED, Subcommands, path_word
 from graspatlas.commands.report import component_lines, result_lines
 from graspatlas.errors import GraspAtlasError
 from graspatlas.multistart.checkpoint import RoundFolder
 from graspatlas.multistart.search import SHARE
 from graspatlas.optimizer.components import Components, SearchStatus, find_components
 from graspatlas.optimizer.optimize import optimize
-from graspatlas.problem.requirement import parse_requirement
 from graspatlas.problems import load_problem
 from graspatlas.quality.evaluation import INDICES
+from graspatlas.requirements.named import parse_requirement
 from graspatlas.result.refinement import SearchEnd
 from graspatlas.support.files import replaced, writable_folder
 from graspatlas.support.terminal import say
 
-__all__ = ["add_optimize_command"]
+__all__ = ["add_commands"]
 
 
-def add_optimize_command(commands: Subcommands) -> None:
+def add_commands(commands: Subcommands) -> None:
     """Add optimize to the subcommands of a parser."""
     best = commands.add_parser("optimize", help="trace all relevant grasps of a problem and find the best one")
     best.add_argument("problem", help="name of a bundled problem, or path of a problem file (YAML)")

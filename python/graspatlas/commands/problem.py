@@ -1,30 +1,24 @@
-"""The commands about problems: graspatlas list, new, check and schema."""
+"""The commands about problem files: graspatlas new, check and schema."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import os
-from dataclasses import fields
 from pathlib import Path
 
 from graspatlas.commands.arguments import Subcommands, path_word
 from graspatlas.commands.diagnosis import PROBLEM, Finding, diagnose, report
 from graspatlas.errors import GraspAtlasError
-from graspatlas.problem.requirement import REQUIREMENTS
-from graspatlas.problems import bundled_problems, load_problem
-from graspatlas.quality.evaluation import INDICES
+from graspatlas.problems import load_problem
 from graspatlas.support.files import replaced
 from graspatlas.support.terminal import say
 
-__all__ = ["add_problem_commands"]
+__all__ = ["add_commands"]
 
 
-def add_problem_commands(commands: Subcommands) -> None:
-    """Add list, new, check and schema to the subcommands of a parser."""
-    listing = commands.add_parser("list", help="list the bundled problems, the quality indices and the requirements")
-    listing.set_defaults(run=_list)
-
+def add_commands(commands: Subcommands) -> None:
+    """Add new, check and schema to the subcommands of a parser."""
     new = commands.add_parser("new", help="write a commented problem file for a hand, to be filled in")
     new.add_argument(
         "urdf",
@@ -44,21 +38,6 @@ def add_problem_commands(commands: Subcommands) -> None:
     schema = commands.add_parser("schema", help="write the JSON Schema of problem files, for editors")
     schema.add_argument("--output", type=path_word, metavar="FILE", help="file to write; standard output by default")
     schema.set_defaults(run=_schema)
-
-
-def _list(_: argparse.Namespace) -> int:
-    say("problems:")
-    for name in bundled_problems():
-        problem = load_problem(name)
-        say(f"  {name:22} t = {problem.full_dimension}. {problem.description}")
-    say("quality indices:")
-    for name, index in INDICES.items():
-        say(f"  {name:26} {(index.__doc__ or '').splitlines()[0]}")
-    say("requirements:")
-    for name, requirement in REQUIREMENTS.items():
-        values = ":".join(field.name.upper() for field in fields(requirement))
-        say(f"  {name}:{values}  {(requirement.__doc__ or '').splitlines()[0]}")
-    return 0
 
 
 def _new(options: argparse.Namespace) -> int:

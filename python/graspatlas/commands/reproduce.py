@@ -7,10 +7,10 @@ import argparse
 from graspatlas.commands.arguments import Subcommands, path_word
 from graspatlas.support.terminal import say
 
-__all__ = ["add_reproduce_command"]
+__all__ = ["add_commands"]
 
 
-def add_reproduce_command(commands: Subcommands) -> None:
+def add_commands(commands: Subcommands) -> None:
     """Add reproduce to the subcommands of a parser."""
     again = commands.add_parser("reproduce", help="run the paper's experiments and write a page to compare with it")
     again.add_argument(

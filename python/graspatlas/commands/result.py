@@ -6,8 +6,7 @@ import argparse
 import json
 import sys
 
-from graspatlas.commands.arguments import Subcommands, chart_named, path_word
-from graspatlas.commands.exit_status import FAILED
+from graspatlas.commands.arguments import FAILED, Subcommands, chart_named, path_word
 from graspatlas.errors import GraspAtlasError
 from graspatlas.execution.pregrasp import DISTANCE
 from graspatlas.formats.export import FORMATS, export_grasps
@@ -16,10 +15,10 @@ from graspatlas.support.columns import FRAME_ENDINGS, save_frame
 from graspatlas.support.terminal import say
 from graspatlas.support.validation import PlainTable
 
-__all__ = ["add_result_commands"]
+__all__ = ["add_commands"]
 
 
-def add_result_commands(commands: Subcommands) -> None:
+def add_commands(commands: Subcommands) -> None:
     """Add view, export and check-result to the subcommands of a parser."""
     look = commands.add_parser("view", help="show the best and the worst grasp of a result")
     look.add_argument("result", type=path_word, help="folder or file that optimize wrote")
@@ -65,12 +64,14 @@ def add_result_commands(commands: Subcommands) -> None:
 def _view(options: argparse.Namespace) -> int:
     result = load_result(options.result)
     from graspatlas.viewer import export_html, save_picture, view  # slow to import
+    from graspatlas.viewer.scene.scene import Scene
 
+    scene = Scene(result) if options.html and options.picture else result
     if options.html:
-        export_html(result, options.html)
+        export_html(scene, options.html)
         say(f"wrote {options.html}: open it in a browser", file=sys.stderr)
     if options.picture:
-        save_picture(result, options.picture)
+        save_picture(scene, options.picture)
         say(f"wrote {options.picture}", file=sys.stderr)
     if not options.html and not options.picture:
         view(result, open_browser=not options.no_browser, host=options.host)

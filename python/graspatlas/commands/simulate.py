@@ -9,8 +9,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from graspatlas.commands.arguments import Subcommands, chart_named, path_word
-from graspatlas.commands.exit_status import FAILED, INTERRUPTED
+from graspatlas.commands.arguments import FAILED, INTERRUPTED, Subcommands, chart_named, path_word
 from graspatlas.errors import GraspAtlasError
 from graspatlas.result.result import Result, load_result
 from graspatlas.simulation.outcome import Simulation
@@ -21,10 +20,10 @@ from graspatlas.simulation.self_test import KNOWN_PROBLEM, self_test
 from graspatlas.simulation.trials import LARGEST_FORCE
 from graspatlas.support.terminal import say
 
-__all__ = ["add_simulate_command"]
+__all__ = ["add_commands"]
 
 
-def add_simulate_command(commands: Subcommands) -> None:
+def add_commands(commands: Subcommands) -> None:
     """Add simulate to the subcommands of a parser."""
     trial = commands.add_parser("simulate", help="try grasps of a result in MuJoCo: close the hand, push the object")
     trial.add_argument("result", type=path_word, nargs="?", help="folder or file that optimize wrote")

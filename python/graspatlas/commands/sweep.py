@@ -6,14 +6,13 @@ import argparse
 import json
 import sys
 
-from graspatlas.commands.arguments import Subcommands, path_word
-from graspatlas.commands.exit_status import FAILED, INTERRUPTED
+from graspatlas.commands.arguments import FAILED, INTERRUPTED, Subcommands, path_word
 from graspatlas.support.terminal import say
 
-__all__ = ["add_sweep_command"]
+__all__ = ["add_commands"]
 
 
-def add_sweep_command(commands: Subcommands) -> None:
+def add_commands(commands: Subcommands) -> None:
     """Add sweep to the subcommands of a parser."""
     many = commands.add_parser("sweep", help="run many problems with many options, on all cores or a cluster")
     many.add_argument("problems", nargs="+", metavar="PROBLEM", help="names of bundled problems, or problem files")

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.execution.actuation import Actuation
@@ -119,6 +118,8 @@ def _way_in(pregrasp: Pregrasp) -> Array:
 
     Between the postures of the walk each actuated joint goes monotonically, so within its limits.
     """
+    from scipy.interpolate import PchipInterpolator  # slow to import
+
     hand = pregrasp.problem.hand
     actuation = Actuation(hand)
     positions = actuation.unwrapped(actuation.positions(pregrasp.path[:, : hand.model.hand_q_size]))

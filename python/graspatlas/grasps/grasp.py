@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 from typing_extensions import Unpack
 
 from graspatlas.errors import GraspAtlasError
@@ -19,7 +18,7 @@ from graspatlas.execution.approach import Approach, approach
 from graspatlas.execution.contact_forces import ContactForces, ForceOptions, contact_forces
 from graspatlas.execution.pregrasp import DISTANCE, Pregrasp, pregrasps
 from graspatlas.execution.squeeze import Stiffness, squeeze
-from graspatlas.grasps.poses import inverse, poses_by_name, se3
+from graspatlas.grasps.poses import inverse, poses_by_name, quaternions, se3
 from graspatlas.support.arrays import Array
 
 if TYPE_CHECKING:
@@ -78,7 +77,7 @@ class Grasp:
     @property
     def object_quat_xyzw(self) -> Array:
         """Rotation of the object as a unit quaternion [4]."""
-        return np.asarray(Rotation.from_matrix(self.T_palm_object[:3, :3]).as_quat())
+        return np.asarray(quaternions(self.T_palm_object[None])[0])
 
     @property
     def T_object_palm(self) -> Array:
@@ -93,7 +92,7 @@ class Grasp:
     @property
     def palm_quat_xyzw(self) -> Array:
         """Rotation of the palm in the object's frame as a unit quaternion [4]."""
-        return np.asarray(Rotation.from_matrix(self.T_object_palm[:3, :3]).as_quat())
+        return np.asarray(quaternions(self.T_object_palm[None])[0])
 
     @property
     def object_pose(self) -> pin.SE3:

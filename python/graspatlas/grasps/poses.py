@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from graspatlas.hand.hand import Hand
+from graspatlas.numerics.rotations import quaternions_from_matrices
 from graspatlas.support.arrays import Array
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def inverse(T: Array) -> Array:
 
 def quaternions(T: Array) -> Array:
     """Rotations of transforms [n, 4, 4] as unit quaternions x y z w [n, 4]."""
-    return np.asarray(Rotation.from_matrix(T[:, :3, :3]).as_quat()).reshape(-1, 4)
+    return quaternions_from_matrices(T[:, :3, :3])
 
 
 def se3(T: Array) -> pin.SE3:

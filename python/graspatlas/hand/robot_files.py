@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+import sys
 from functools import lru_cache
-from importlib import metadata, resources
+from importlib import resources
 from pathlib import Path
 
 from graspatlas.errors import GraspAtlasError, unknown_name
@@ -25,11 +26,15 @@ def robots_folder() -> Path:
 @lru_cache(maxsize=1)
 def _example_share() -> Path | None:
     """Folder that holds the package example-robot-data, or None when it is not installed."""
-    try:
-        share = Path(str(metadata.distribution("example-robot-data").locate_file("cmeel.prefix/share")))
-    except metadata.PackageNotFoundError:
-        return None
-    return share if share.is_dir() else None
+    shares = [*(Path(place) / "cmeel.prefix" / "share" for place in sys.path), Path(sys.prefix) / "share"]  # pip, conda
+    return next((share for share in shares if (share / "example-robot-data").is_dir()), None)
+
+
+@lru_cache(maxsize=1)
+def _example_urdfs(share: Path) -> dict[str, str]:
+    """The ``package://`` paths of all URDFs in example-robot-data, by the files' names without ending."""
+    urdfs = sorted(share.glob("example-robot-data/robots/*/**/*.urdf"))
+    return {path.stem: PACKAGE + path.relative_to(share).as_posix() for path in urdfs}
 
 
 def package_folders(urdf: Path | None, stated: tuple[str, ...] = ()) -> tuple[str, ...]:
@@ -83,10 +88,10 @@ def example_robot(name: str) -> str:
     share = _example_share()
     if share is None:
         raise GraspAtlasError("example-robot-data is not installed: pip install example-robot-data")
-    found = {path.stem: path for path in sorted(share.glob("example-robot-data/robots/*/**/*.urdf"))}
+    found = _example_urdfs(share)
     if name not in found:
         raise unknown_name("robot", name, found, "in example-robot-data")
-    return PACKAGE + found[name].relative_to(share).as_posix()
+    return found[name]
 
 
 #: Paths that are longer are not quoted [characters].

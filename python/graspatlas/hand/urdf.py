@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from html import escape
 from xml.etree import ElementTree
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.mechanism import Mimic, read_mimics
+from graspatlas.numerics.rotations import matrix_from_rotvec, matrix_from_rpy, rpy_from_matrix
 from graspatlas.support.arrays import Array
 
 __all__ = [
@@ -115,23 +115,23 @@ def center_of_mass(urdf: str) -> Array:
         urdf: Text of a URDF; links without a positive mass weigh nothing, and without any the centre is the origin.
     """
     root = ElementTree.fromstring(urdf)
-    placed = {root_link(urdf): (Rotation.identity(), np.zeros(3))}
+    placed = {root_link(urdf): (np.eye(3), np.zeros(3))}
     joints = root.findall("joint")
     for _ in joints:
         for joint in joints:
             parent, child = (_link_of(joint, side) for side in ("parent", "child"))
             if parent in placed and child not in placed:
-                rotation, at = placed[parent]
+                R, at = placed[parent]
                 turned, moved = _origin(joint)
-                placed[child] = rotation * turned, at + rotation.apply(moved)
+                placed[child] = R @ turned, at + R @ moved
     moment, total = np.zeros(3), 0.0
     for link in root.findall("link"):
         inertial, mass = link.find("inertial"), link.find("inertial/mass")
         weight = 0.0 if mass is None else float(mass.get("value", "0"))
         if inertial is None or not weight > 0.0 or str(link.get("name")) not in placed:
             continue
-        rotation, at = placed[str(link.get("name"))]
-        moment, total = moment + weight * (at + rotation.apply(_origin(inertial)[1])), total + weight
+        R, at = placed[str(link.get("name"))]
+        moment, total = moment + weight * (at + R @ _origin(inertial)[1]), total + weight
     return np.asarray(moment / total) if total > 0.0 else moment
 
 
@@ -141,13 +141,12 @@ def _link_of(joint: ElementTree.Element, side: str) -> str:
     return "" if element is None else str(element.get("link"))
 
 
-def _origin(element: ElementTree.Element) -> tuple[Rotation, Array]:
-    """Rotation and translation [m] of the ``<origin>`` of a joint or inertial."""
+def _origin(element: ElementTree.Element) -> tuple[Array, Array]:
+    """Rotation (3, 3) and translation (3,) [m] of the ``<origin>`` of a joint or inertial."""
     origin = element.find("origin")
     if origin is None:
-        return Rotation.identity(), np.zeros(3)
-    rotation = Rotation.from_euler("xyz", _triple(origin.get("rpy"), (0, 0, 0)))
-    return rotation, _triple(origin.get("xyz"), (0, 0, 0))
+        return np.eye(3), np.zeros(3)
+    return matrix_from_rpy(_triple(origin.get("rpy"), (0, 0, 0))), _triple(origin.get("xyz"), (0, 0, 0))
 
 
 def root_link(urdf: str) -> str:
@@ -268,12 +267,11 @@ def _lock(joint: ElementTree.Element, position: float) -> None:
     element = joint.find("axis")
     axis = _triple(None if element is None else element.get("xyz"), (1, 0, 0))
     axis = axis / max(float(np.linalg.norm(axis)), np.finfo(float).tiny)
-    rotation = Rotation.from_euler("xyz", rpy)
+    R = matrix_from_rpy(rpy)
     if kind in TURNING:
-        turned = rotation * Rotation.from_rotvec(position * axis)
-        rpy = turned.as_euler("xyz", suppress_warnings=True)
+        rpy = rpy_from_matrix(R @ matrix_from_rotvec(position * axis))
     else:
-        xyz = xyz + rotation.apply(position * axis)
+        xyz = xyz + R @ (position * axis)
     origin.set("xyz", _words(xyz))
     origin.set("rpy", _words(rpy))
     joint.set("type", "fixed")
@@ -307,13 +305,13 @@ def cylinder_urdf(name: str, radius: float, length: float) -> str:
 
 def mesh_urdf(name: str, filename: str, scale: Iterable[float]) -> str:
     """URDF of a mesh; `filename` as URDFs name them, `scale` (3,) from the mesh's unit to metres."""
-    return _one_link(name, f'<mesh filename={quoteattr(filename)} scale="{_words(scale)}"/>')
+    return _one_link(name, f'<mesh filename="{escape(filename)}" scale="{_words(scale)}"/>')
 
 
 def _one_link(name: str, shape: str) -> str:
     """One link, seen and touched as one shape."""
     geometry = f"<geometry>{shape}</geometry>"
     return (
-        f'<robot name={quoteattr(name)}><link name={quoteattr(name)}><visual>{geometry}<material name="grey">'
+        f'<robot name="{escape(name)}"><link name="{escape(name)}"><visual>{geometry}<material name="grey">'
         f'<color rgba="0.72 0.74 0.78 1"/></material></visual><collision>{geometry}</collision></link></robot>'
     )

@@ -239,7 +239,7 @@ def _trace_all(
                 if traced.results:
                     return SearchStatus.NO_GRASP
                 traced.trace(search.problem.at(x))  # says why no atlas can grow
-            bar.set_postfix(grasps=search.found, components=len(traced.results), refresh=False)
+            bar.note(f"grasps={search.found}, components={len(traced.results)}")
     return SearchStatus.COVERED
 
 

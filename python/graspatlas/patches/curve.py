@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
@@ -16,6 +15,9 @@ from graspatlas.patches.base import Interval, Patch
 from graspatlas.patches.nearest import nearest_parameters
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import PlainTable, number_array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 __all__ = ["Curve"]
 
@@ -82,6 +84,8 @@ class Curve(Patch):
 
     def _spline(self) -> CubicSpline:
         """Parameters (u, v) over the length along the curve."""
+        from scipy.interpolate import CubicSpline  # slow to import
+
         s = np.concatenate([[0.0], np.cumsum(self._lengths())])
         return CubicSpline(s, np.array(self.points), bc_type="natural")
 

@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import BSpline as SplineBasis
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from graspatlas.errors import GraspAtlasError
+from graspatlas.numerics.groups import linked_groups
 from graspatlas.patches.base import Vector3, checked_length, checked_vector, placement
 from graspatlas.patches.spline import BSpline, clamped_knots
 from graspatlas.support.arrays import Array, BoolArray, IntArray
@@ -201,8 +199,9 @@ def _region(corners: Array, faces: IntArray, nearest: int, half: float) -> IntAr
     directed = faces[over][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     edges = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True)[1].reshape(-1)
     owners = np.repeat(np.arange(len(over)), 3)
-    incidence = coo_array((np.ones(len(edges)), (owners, edges))).tocsr()
-    groups = connected_components(incidence @ incidence.T, directed=False)[1]
+    order = np.argsort(edges, kind="stable")
+    same = np.flatnonzero(np.diff(edges[order]) == 0)
+    groups = linked_groups(len(over), np.column_stack([owners[order][same], owners[order][same + 1]]))
     mine = groups == groups[np.searchsorted(over, nearest)]
     directed = directed[np.repeat(mine, 3)]
     if len(np.unique(directed, axis=0)) < len(directed):
@@ -255,13 +254,20 @@ def _heights(triangles: Array, ticks: Array, half: float) -> Array:
 
 def _fitted(heights: Array, ticks: Array, knots: Array) -> Array:
     """Heights of the control net (n, n): least squares along u and along v, with a penalty on second differences."""
-    A = SplineBasis.design_matrix(ticks, knots, DEGREE).toarray()
+    A = _basis(ticks, knots)
     D = np.diff(np.eye(A.shape[1]), 2, axis=0)
     S = np.linalg.solve(A.T @ A + SMOOTHING * D.T @ D, A.T)
     return np.asarray(S @ heights @ S.T)
 
 
+def _basis(x: Array, knots: Array) -> Array:
+    """Values of the B-splines (m, n) at parameters x (m,)."""
+    from scipy.interpolate import BSpline as SplineBasis  # slow to import
+
+    return np.asarray(SplineBasis.design_matrix(x, knots, DEGREE).toarray())
+
+
 def _gaps(net: Array, knots: Array, points: Array) -> Array:
     """Heights of points (u, v, height) (n, 3) over the spline (n,)."""
-    u, v = (SplineBasis.design_matrix(points[:, i], knots, DEGREE).toarray() for i in range(2))
+    u, v = (_basis(points[:, i], knots) for i in range(2))
     return np.asarray(points[:, 2] - np.einsum("ni,ij,nj->n", u, net, v))

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import least_squares
 
 from graspatlas import _core
 from graspatlas.patches.base import Interval
@@ -35,6 +34,8 @@ def nearest_parameters(
     Returns:
         The parameters [1 or 2].
     """
+    from scipy.optimize import least_squares  # slow to import
+
     target = np.asarray(point, float)
     n = len(search)
     axes = [np.linspace(low, high, GRID) for low, high in search]

@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
@@ -173,5 +172,7 @@ class Revolution(TurnedPatch):
         if len(self.heights) == 2:
             slope = (self.radii[1] - self.radii[0]) / (self.heights[1] - self.heights[0])
             return np.array(self.heights), np.array([[self.radii[0], slope, 0.0, 0.0]])
+        from scipy.interpolate import CubicSpline  # slow to import
+
         spline = CubicSpline(self.heights, self.radii, bc_type="natural")
         return np.asarray(spline.x), np.ascontiguousarray(spline.c[::-1].T)

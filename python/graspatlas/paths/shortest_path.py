@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 from numbers import Integral
-from typing import overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components, dijkstra
 
 from graspatlas.atlas.atlas import Atlas
 from graspatlas.errors import GraspAtlasError
@@ -28,6 +26,9 @@ from graspatlas.support.validation import number_array, positive
 from graspatlas.systems.chain import Allowed
 from graspatlas.systems.geodesic import arc_lengths, bridge, evenly, shorten
 from graspatlas.systems.tangent_maps import BOUND_TOLERANCE
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 __all__ = ["shortest_path"]
 
@@ -269,6 +270,8 @@ class _ChartGraph:
 
     def _route(self) -> list[int]:
         """Nodes of the shortest way through the graph."""
+        from scipy.sparse.csgraph import dijkstra  # slow to import
+
         start, end = self.nodes
         graph = self._graph()
         distances, before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
@@ -279,11 +282,15 @@ class _ChartGraph:
             route.append(int(before[route[-1]]))
         return route[::-1]
 
-    def _graph(self) -> csr_array:
+    def _graph(self) -> sparse.csr_array:
+        from scipy.sparse import coo_array  # slow to import
+
         n = len(self.points)
         return coo_array((self.lengths, (self.pairs[:, 0], self.pairs[:, 1])), shape=(n, n)).tocsr()
 
-    def _not_connected(self, graph: csr_array) -> GraspAtlasError:
+    def _not_connected(self, graph: sparse.csr_array) -> GraspAtlasError:
+        from scipy.sparse.csgraph import connected_components  # slow to import
+
         group = connected_components(graph, directed=False)[1]
         sizes = [int((group[self.open] == group[node]).sum()) for node in self.nodes]
         pieces = len(np.unique(group[self.open]))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from graspatlas.patches.base import Patch
 from graspatlas.problem.contacts import Contact
@@ -65,6 +64,8 @@ def touching_parameters(contact: Contact, T_hand_object: Array, length_scale: fl
     starts.sort(key=lambda w: float(np.linalg.norm(residual(w))))
     best = starts[0]
     if np.linalg.norm(residual(best)) > TOUCHING:
+        from scipy.optimize import least_squares  # slow to import
+
         found = [
             least_squares(residual, w, jacobian, limits, x_scale="jac", xtol=TOLERANCE, ftol=TOLERANCE, gtol=TOLERANCE)
             for w in starts[:STARTS]

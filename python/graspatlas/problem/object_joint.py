@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from graspatlas import _core
 from graspatlas.errors import unknown_name
+from graspatlas.numerics.rotations import quaternions_from_matrices
 from graspatlas.support.arrays import Array
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 __all__ = ["FREE_FLYER", "PLANAR", "ObjectJoint", "Quaternion", "Vector3", "object_joint"]
 
@@ -119,11 +122,13 @@ class _FreeFlyer(ObjectJoint):
 
     def to_rotation(self, pose: Array) -> tuple[Array, Rotation]:
         """Position and rotation of the quaternion."""
+        from scipy.spatial.transform import Rotation  # slow to import
+
         return pose[:3], Rotation.from_quat(pose[3:])
 
     def from_motion(self, R: Array, t: Array) -> Array:
         """Translation and the rotation's quaternion."""
-        return np.array([*t, *Rotation.from_matrix(R).as_quat()])
+        return np.array([*t, *quaternions_from_matrices(R)[0]])
 
     def nearest(self, xyz: Array, rotation: Rotation) -> Array:
         """This pose itself."""
@@ -131,6 +136,8 @@ class _FreeFlyer(ObjectJoint):
 
     def random_rotation(self, rng: np.random.Generator) -> Array:
         """A rotation from the uniform distribution over all."""
+        from scipy.spatial.transform import Rotation  # slow to import
+
         return np.asarray(Rotation.from_quat(rng.normal(size=4)).as_matrix())
 
 
@@ -161,6 +168,8 @@ class _Planar(ObjectJoint):
 
     def to_rotation(self, pose: Array) -> tuple[Array, Rotation]:
         """Position with z = 0 and rotation about z."""
+        from scipy.spatial.transform import Rotation  # slow to import
+
         return np.r_[pose[:2], 0.0], Rotation.from_rotvec([0.0, 0.0, np.arctan2(pose[3], pose[2])])
 
     def from_motion(self, R: Array, t: Array) -> Array:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.first_grasp import LARGEST, unit_quaternion
 from graspatlas.problem.object_joint import PLANAR
 from graspatlas.support.validation import PlainTable, StatedTable, checked_table, number_array, numbers
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 __all__ = ["PoseGuess"]
 
@@ -54,6 +57,8 @@ class PoseGuess:
             xyz: Position (3,), metres.
             rotation: Rotation.
         """
+        from scipy.spatial.transform import Rotation  # slow to import
+
         distance = float(np.linalg.norm(np.asarray(xyz) - self.xyz))
         if self.quat_xyzw is None:
             return distance, 0.0

@@ -21,12 +21,13 @@ from graspatlas.problem.contacts import Contact
 from graspatlas.problem.first_grasp import FirstGrasp
 from graspatlas.problem.pose_guess import PoseGuess
 from graspatlas.problem.problem import Problem
-from graspatlas.problem.requirement import StatedRequirement, requirement_from_dict
+from graspatlas.problem.requirement import StatedRequirement
 from graspatlas.problem_files import documents
 from graspatlas.problem_files.faults import ProblemFileError, faults_of_validation, narrowed, one_line
 from graspatlas.problem_files.postures import read_postures
 from graspatlas.problem_files.schema import ContactTable, HandTable, MotionsTable, ObjectTable, ProblemTable
 from graspatlas.problem_files.schema_tables import Table
+from graspatlas.requirements.named import requirement_from_dict
 
 __all__ = ["FILL_IN", "read_problem"]
 

@@ -13,10 +13,10 @@ from graspatlas.atlas.atlas import LARGEST, Atlas
 from graspatlas.atlas.status import Audit, Status
 from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.problem import Problem
-from graspatlas.problem.requirement import parse_requirement
 from graspatlas.quality.batched import quality_name
 from graspatlas.requirements.base import RequirementLike, requirement_name
 from graspatlas.requirements.lost import Lost
+from graspatlas.requirements.named import parse_requirement
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.result.refinement import Refinement, SearchEnd, SearchReport
 from graspatlas.support.archives import DamagedArchive, read_arrays

@@ -7,13 +7,11 @@ the tries at a first grasp start near that, see :mod:`graspatlas.search.starts_n
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from tqdm import tqdm
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
@@ -23,7 +21,7 @@ from graspatlas.search.starts_near_guess import starts_near
 from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.support.deadlines import deadline_after
 from graspatlas.support.interrupts import stoppable
-from graspatlas.support.progress import progress_bar
+from graspatlas.support.progress import ProgressBar, progress_bar
 from graspatlas.support.validation import whole
 
 __all__ = ["MAX_TRIES", "GraspSearch", "find_grasps", "with_first_grasp"]
@@ -88,10 +86,10 @@ def find_grasps(
                     found.append(x)
                     places.append(place)
                     last_new = search.tries
-                    bar.set_postfix(grasps=len(found), refresh=False)
+                    bar.note(f"grasps={len(found)}")
         except KeyboardInterrupt:
-            if not bar.disable:
-                bar.write(f"interrupted: keeping {len(found)} grasps", file=sys.stderr)
+            if bar.shown:
+                bar.write(f"interrupted: keeping {len(found)} grasps")
     return np.array(found).reshape(len(found), search.system.configuration_size)
 
 
@@ -142,7 +140,7 @@ class GraspSearch:
         guess = problem.pose_guess if problem.x1 is None else None
         self._near_guess = starts_near(guess, self._starts, self._rng) if guess else iter(())
 
-    def next_grasp(self, deadline: float, bar: tqdm[None]) -> Array | None:
+    def next_grasp(self, deadline: float, bar: ProgressBar) -> Array | None:
         """The next grasp (size of x,); None after ``MAX_TRIES`` tries without one, or when the clock passes `deadline`.
 
         Args:
@@ -158,7 +156,7 @@ class GraspSearch:
                 return x
         return None
 
-    def next_start(self, deadline: float, bar: tqdm[None]) -> Array | None:
+    def next_start(self, deadline: float, bar: ProgressBar) -> Array | None:
         """The next grasp from which an atlas can grow; or a singular one, after ``MAX_SINGULAR`` of these in a row."""
         first = None
         for _ in range(MAX_SINGULAR):

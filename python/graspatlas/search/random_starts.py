@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy.optimize import linprog
-from scipy.spatial.transform import Rotation
 
 from graspatlas import _core
 from graspatlas.problem.problem import Problem
 from graspatlas.support.arrays import Array
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 __all__ = ["Starts"]
 
@@ -123,6 +126,8 @@ class Starts:
 
     def _middle(self) -> Array:
         """Centre of the largest ball of postures within the limits (p,)."""
+        from scipy.optimize import linprog  # slow to import
+
         lengths = np.linalg.norm(self._A, axis=1)
         aim = np.r_[np.zeros(self._A.shape[1]), -1.0]
         found = linprog(

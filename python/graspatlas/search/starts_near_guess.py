@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from graspatlas.problem.pose_guess import PoseGuess
 from graspatlas.search.random_starts import Starts
@@ -35,6 +34,8 @@ def starts_near(guess: PoseGuess, starts: Starts, rng: np.random.Generator) -> I
     Yields:
         Starts (configuration_size,).
     """
+    from scipy.spatial.transform import Rotation  # slow to import
+
     for i in range(AT_GUESS):
         far = i / AT_GUESS
         shift = far * SHIFT * starts.hand_size * rng.uniform(-1.0, 1.0, 3)

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from graspatlas.collision.shapes import Shape
+from graspatlas.numerics.rotations import quaternions_from_matrices
 from graspatlas.support.arrays import Array
 
 __all__ = ["add_inertial", "add_shape", "child", "pose", "text"]
@@ -30,7 +30,7 @@ def text(numbers: Iterable[float]) -> str:
 
 def pose(T: Array) -> dict[str, str]:
     """Attributes of a pose (4, 4)."""
-    x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat()
+    x, y, z, w = quaternions_from_matrices(T[:3, :3])[0]
     return {"pos": text(T[:3, 3]), "quat": text((w, x, y, z))}
 
 

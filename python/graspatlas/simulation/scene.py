@@ -12,11 +12,11 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from graspatlas.collision.problem_shapes import collision_shapes
 from graspatlas.collision.shapes import Shape, convex_hull
 from graspatlas.errors import GraspAtlasError
+from graspatlas.numerics.rotations import quaternions_from_matrices
 from graspatlas.problem.problem import Problem
 from graspatlas.simulation.inertia import unit_inertia
 from graspatlas.simulation.mjcf import add_inertial, add_shape, child, pose, text
@@ -115,11 +115,13 @@ class Scene:
             qpos[:, at + 2] = np.arctan2(R[:, 1, 0], R[:, 0, 0])
         else:
             qpos[:, at : at + 3] = center
-            qpos[:, at + 3 : at + 7] = Rotation.from_matrix(R).as_quat()[:, [3, 0, 1, 2]]
+            qpos[:, at + 3 : at + 7] = quaternions_from_matrices(R)[:, [3, 0, 1, 2]]
         return qpos
 
     def poses(self, qpos: Array) -> tuple[Array, Array]:
         """Joint positions (n, h) and poses of the object (n, 4, 4) of MuJoCo's configurations (n, nq)."""
+        from scipy.spatial.transform import Rotation  # slow to import
+
         columns = [self.model.joint(name).qposadr[0] for name in self.problem.hand.joints]
         T, at = np.tile(np.eye(4), (len(qpos), 1, 1)), self.object_at
         if self.problem.object_joint_model.planar:

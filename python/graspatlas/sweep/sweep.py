@@ -17,8 +17,8 @@ from pathlib import Path
 
 from graspatlas.cluster.client import need
 from graspatlas.errors import GraspAtlasError
-from graspatlas.problem.requirement import parse_requirement
 from graspatlas.quality.evaluation import find_index
+from graspatlas.requirements.named import parse_requirement
 from graspatlas.result.refinement import PeakStatus
 from graspatlas.support.files import writable_folder
 from graspatlas.support.interrupts import stoppable

@@ -9,7 +9,7 @@ from graspatlas.cluster.client import connected
 from graspatlas.errors import GraspAtlasError
 from graspatlas.optimizer.optimize import optimize
 from graspatlas.problem.problem import Problem
-from graspatlas.problem.requirement import parse_requirement
+from graspatlas.requirements.named import parse_requirement
 from graspatlas.result.result import Result
 from graspatlas.support.machine import available_threads
 from graspatlas.sweep.rows import Row

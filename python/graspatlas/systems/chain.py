@@ -8,7 +8,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
 from graspatlas.support.arrays import Array, BoolArray, IndexArray
 from graspatlas.systems.system import AnySystem
@@ -116,6 +115,8 @@ class Chain:
 
     def _solve(self, force: Array, barrier: float | Array = 0.0) -> Array:
         """Moves du [n, k] with (Hessian + barrier) du = -force, and none of the ends; barrier (n, k, k)."""
+        from scipy.linalg import solveh_banded  # slow to import
+
         n, k = force.shape
         free = np.ones((n, 1, 1))
         free[[0, -1]] = 0.0

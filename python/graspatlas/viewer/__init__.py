@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import meshcat
 
     from graspatlas.viewer.scene.animation import Film
+    from graspatlas.viewer.scene.scene import Scene
 
 __all__ = ["Shown", "export_html", "save_picture", "view"]
 
@@ -50,7 +51,7 @@ def view(shown: Shown, *, open_browser: bool = True, wait: bool = True, host: st
     return show(told, open_browser=open_browser, wait=wait, host=host)
 
 
-def export_html(shown: Shown, path: str | os.PathLike[str]) -> None:
+def export_html(shown: Shown | Scene, path: str | os.PathLike[str]) -> None:
     """Write the best and the worst grasp of a result as one page to rotate; or a path or trials, with a slider.
 
     The page opens from the disk; it needs neither a server nor the network. That of a film opens at the frame that its
@@ -58,6 +59,7 @@ def export_html(shown: Shown, path: str | os.PathLike[str]) -> None:
 
     Args:
         shown: The result, a path of grasps, or what :func:`graspatlas.record` recorded: one trial, or a list of them.
+            The scene of a result, which takes a moment to set up, can be shown more than once.
         path: Such as ``"can.html"``; an existing file is replaced.
 
     Raises:
@@ -68,14 +70,15 @@ def export_html(shown: Shown, path: str | os.PathLike[str]) -> None:
     from graspatlas.viewer.web.animation_page import film_page
     from graspatlas.viewer.web.page import page
 
-    shown = _checked(shown)
+    shown = shown if isinstance(shown, Scene) else _checked(shown)
     with replaced(path) as stream:
-        text = page(Scene(shown)) if isinstance(shown, Result) else film_page(_film(shown))
+        shown = Scene(shown) if isinstance(shown, Result) else shown
+        text = page(shown) if isinstance(shown, Scene) else film_page(_film(shown))
         stream.write(text.encode("utf-8"))
 
 
 def save_picture(
-    shown: Shown,
+    shown: Shown | Scene,
     path: str | os.PathLike[str],
     *,
     width: int = 1600,
@@ -88,6 +91,7 @@ def save_picture(
 
     Args:
         shown: The result, a path of grasps, or what :func:`graspatlas.record` recorded: one trial, or a list of them.
+            The scene of a result, which takes a moment to set up, can be shown more than once.
         path: Such as ``"can.png"``; an existing file is replaced.
         width: Width in pixels, at least 320.
         height: Height in pixels, at least 180.
@@ -106,10 +110,11 @@ def save_picture(
     if os.path.splitext(path)[1].lower() != ".png":
         raise GraspAtlasError(f"a picture's name must end in .png, not '{os.fspath(path)}'")
     check_size(width, height)
-    shown = _checked(shown)
+    shown = shown if isinstance(shown, Scene) else _checked(shown)
     with replaced(path) as stream:
-        if isinstance(shown, Result):
-            image = draw(Scene(shown, worst=worst), width, height)
+        shown = Scene(shown, worst=worst) if isinstance(shown, Result) else shown
+        if isinstance(shown, Scene):
+            image = draw(shown, width, height)
         elif isinstance(shown, Path):
             image = draw_strip(path_film(shown, FRAMES), width, height)
         else:

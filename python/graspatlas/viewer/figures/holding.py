@@ -7,7 +7,6 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
-from scipy.stats import spearmanr
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasps
@@ -109,6 +108,8 @@ def _draw_dots(axes: Axes, simulation: Simulation, forces: Array, known: BoolArr
 
 def _agreement(predicted: Array, simulated: Array) -> str:
     """How well predictions agree, in words; nothing where all are alike."""
+    from scipy.stats import spearmanr  # slow to import
+
     if min(np.ptp(predicted), np.ptp(simulated)) == 0.0:
         return ""
     rank, median = spearmanr(predicted, simulated).statistic, np.median(np.abs(simulated - predicted))

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from graspatlas import _core
 from graspatlas.grasps.grasp import Grasp
 from graspatlas.problem.problem import Problem
 from graspatlas.support.arrays import Array, Float32Array
+from graspatlas.viewer.render.picture import RIM
 from graspatlas.viewer.render.raster import nearest
-from graspatlas.viewer.render.shading import Shadow, dots, lamps, shade, to_linear, to_screen
+from graspatlas.viewer.render.shading import Shadow, lamps, to_linear
 from graspatlas.viewer.scene.bodies import BodyShapes
 from graspatlas.viewer.scene.camera import Camera
 from graspatlas.viewer.scene.meshes import merged
@@ -65,10 +67,10 @@ def portrait(
     clear.sort(key=lambda part: camera.project(_corners([part]).reshape(-1, 3), 1.0)[:, 2].max())
     for layer, see_through in ((opaque, False), *(([part], False) for part in clear), (parts, True)):
         _paint(layer, camera, size, light, front, shadow, see_through)
-    pixels = to_screen(light.reshape(height, SAMPLES, width, SAMPLES, 3).mean(axis=(1, 3)))
+    pixels = _core.developed(light, width, height, SAMPLES)
     background = front.reshape(height, SAMPLES, width, SAMPLES).max(axis=(1, 3)) == 0.0
-    pixels[background] = 1.0
-    return np.asarray(np.round(255.0 * np.clip(pixels, 0.0, 1.0)), np.uint8)
+    pixels[background] = 255
+    return pixels
 
 
 def _parts(shapes: BodyShapes, grasp: Grasp) -> list[Part]:
@@ -112,22 +114,25 @@ def _paint(
     owner = np.repeat(np.arange(len(shown)), [len(m.faces) for m in placed])
     seen = camera.project(points.reshape(-1, 3), size[0] / size[1])
     screen = np.column_stack([(seen[:, 0] + 1.0) * size[0] / 2.0, (1.0 - seen[:, 1]) * size[1] / 2.0, seen[:, 2]])
-    found = nearest(screen.reshape(-1, 3, 3), *size)
+    screen = screen.reshape(-1, 3, 3)
+    found = nearest(screen, *size)
     hidden = found.nearness < front[found.pixels]
     found = found[hidden if see_through else ~hidden]
-    colours = np.array([p.colour for p in shown])[owner[found.triangles]]
-    at = np.einsum("ij,ijk->ik", found.weights, points[found.triangles]).astype(np.float32)
-    outward = np.einsum("ij,ijk->ik", found.weights, normals[found.triangles]).astype(np.float32)
-    to_camera = camera.position.astype(np.float32) - at
-    to_camera /= np.linalg.norm(to_camera, axis=1, keepdims=True)
-    outward *= (np.where(dots(outward, to_camera) < 0.0, -1.0, 1.0) / np.linalg.norm(outward, axis=1))[:, None]
-    lit = shadow.lit(at, outward) if shadow is not None else np.ones(len(at), np.float32)
-    base = to_linear(colours[:, :3]).astype(np.float32)
-    shaded = shade(base, outward, to_camera, lit, lamps(camera))
+    colours = np.array([(*to_linear(np.array(p.colour[:3])), p.colour[3]) for p in shown])[owner]
+    shaded, facing = _core.shaded(
+        points,
+        normals,
+        screen[:, :, 2],
+        colours,
+        found.triangles,
+        found.weights,
+        camera.position,
+        [(lamp.direction, lamp.intensity) for lamp in lamps(camera)],
+        None if shadow is None else (shadow.axes, shadow.origin, shadow.pixel, shadow.depths),
+    )
+    clear = colours[found.triangles, 3]
+    glass = clear + (1.0 - clear) * RIM * (1.0 - facing) ** 3
     opacity = np.array([SHOW_THROUGH.get(p.group, 1.0) for p in shown])[owner[found.triangles]]
-    slanted = 0.75 * (1.0 - np.clip(dots(outward, to_camera), 0.0, 1.0)) ** 3
-    glass = colours[:, 3] + (1.0 - colours[:, 3]) * slanted
-    alpha = (opacity if see_through else glass)[:, None].astype(np.float32)
-    light[found.pixels] = (1.0 - alpha) * light[found.pixels] + alpha * shaded
+    _core.lay_over(light, found.pixels, opacity if see_through else glass, shaded)
     if not see_through:
         front[found.pixels] = np.maximum(front[found.pixels], found.nearness)

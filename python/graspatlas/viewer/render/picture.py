@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 from PIL import Image
 
+from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.support.arrays import Float32Array
-from graspatlas.viewer.render.raster import Fragments, fragments, nearest
-from graspatlas.viewer.render.shading import FloorShadow, Shadow, crevices, dots, lamps, shade, to_linear, to_screen
+from graspatlas.viewer.render.raster import Fragments, in_front_of, nearest
+from graspatlas.viewer.render.shading import FloorShadow, Shadow, crevices, lamps, to_linear
 from graspatlas.viewer.render.text_images import GREY, caption_image, legend_image, text_image
 from graspatlas.viewer.scene.camera import Camera
 from graspatlas.viewer.scene.captions import caption, legend, subtitle
@@ -35,6 +36,8 @@ WINDOW = (-0.88, 0.88, -0.54, 0.86)
 BACKGROUND = ((0.985, 0.988, 0.992), (0.855, 0.868, 0.885))
 #: Share of the light that the darkest crevice loses.
 CREVICE = 0.75
+#: How much less see-through a surface is where it is seen edge on.
+RIM = 0.75
 
 
 def check_size(width: int, height: int) -> None:
@@ -62,11 +65,7 @@ def draw(scene: Scene, width: int, height: int) -> Image.Image:
 def painted(parts: list[Part], camera: Camera, width: int, height: int) -> Image.Image:
     """Parts as a camera sees them, without words."""
     painter = _Painter(parts, camera, width * SAMPLES, height * SAMPLES)
-    samples = painter.paint().reshape(height, SAMPLES, width, SAMPLES, 3)
-    light = np.zeros((height, width, 3))
-    for i, j in np.ndindex(SAMPLES, SAMPLES):
-        light += samples[:, i, :, j] / SAMPLES**2
-    return Image.fromarray(np.round(255.0 * np.clip(to_screen(light), 0.0, 1.0)).astype(np.uint8))
+    return Image.fromarray(_core.developed(painter.paint(), width, height, SAMPLES))
 
 
 def _write(image: Image.Image, scene: Scene, camera: Camera) -> None:
@@ -102,15 +101,6 @@ class _Triangles:
         x, y = (seen[:, 0] + 1.0) * width / 2.0, (1.0 - seen[:, 1]) * height / 2.0
         self.screen = np.column_stack([x, y, seen[:, 2]]).reshape(-1, 3, 3)
 
-    def surface(self, found: Fragments) -> tuple[Float32Array, Float32Array]:
-        """Points and unnormalised normals of fragments [n, 3]."""
-        near = self.screen[:, :, 2].astype(np.float32)[found.triangles]
-        weights = found.weights * near
-        weights /= (weights[:, 0] + weights[:, 1] + weights[:, 2])[:, None]
-        points = np.einsum("ij,ijk->ik", weights, self.points.astype(np.float32)[found.triangles])
-        normals = np.einsum("ij,ijk->ik", weights, self.normals[found.triangles])
-        return points, normals
-
 
 class _Painter:
     """Paints parts into an array of linear light, from back to front."""
@@ -135,7 +125,7 @@ class _Painter:
         """Linear light [height * width, 3]."""
         light = self._background()
         found = nearest(self.solid.screen, self.width, self.height)
-        light[found.pixels] = self._shaded(self.solid, found)[0]
+        light[found.pixels] = self._shaded(self.solid, found, shadow=self.shadow)[0]
         self.nearness[found.pixels] = found.nearness
         self._darken_crevices(light)
         self._paint_clear(light)
@@ -154,24 +144,23 @@ class _Painter:
         top, bottom = (to_linear(np.array(colour)) for colour in BACKGROUND)
         light = top + (bottom - top) * (0.5 - 0.5 * y[..., None]) ** 1.5
         light *= (1.0 - dark.reshape(rows, columns, 1)) * (1.0 - 0.10 * x[..., None] ** 4)
-        size = (self.width, self.height)
-        bands = [
-            Image.fromarray(light[..., k].astype(np.float32)).resize(size, Image.Resampling.BILINEAR) for k in range(3)
-        ]
-        return np.stack([np.asarray(band) for band in bands], axis=-1).reshape(-1, 3)
+        return np.asarray(_core.enlarged(light, self.width, self.height)).reshape(-1, 3)
 
     def _shaded(
-        self, triangles: _Triangles, found: Fragments, *, shadows: bool = True
+        self, triangles: _Triangles, found: Fragments, *, shadow: Shadow | None
     ) -> tuple[Float32Array, Float32Array]:
         """Light [n, 3] of fragments, and how squarely they face the camera [n]."""
-        points, normals = triangles.surface(found)
-        to_camera = self.camera.position.astype(np.float32) - points
-        to_camera /= np.sqrt(dots(to_camera, to_camera))[:, None]
-        outward = np.where(dots(normals, to_camera) < 0.0, -1.0, 1.0)
-        normals *= (outward / np.sqrt(dots(normals, normals)))[:, None].astype(np.float32)
-        lit = self.shadow.lit(points, normals) if shadows else np.ones(len(points), np.float32)
-        colours = triangles.colours[found.triangles, :3]
-        return shade(colours, normals, to_camera, lit, self.lamps), dots(normals, to_camera)
+        return _core.shaded(
+            triangles.points,
+            triangles.normals,
+            triangles.screen[:, :, 2],
+            triangles.colours,
+            found.triangles,
+            found.weights,
+            self.camera.position,
+            [(lamp.direction, lamp.intensity) for lamp in self.lamps],
+            None if shadow is None else (shadow.axes, shadow.origin, shadow.pixel, shadow.depths),
+        )
 
     def _darken_crevices(self, light: Float32Array) -> None:
         near = self.nearness.reshape(self.height, self.width)[::SAMPLES, ::SAMPLES]
@@ -183,29 +172,15 @@ class _Painter:
 
     def _paint_clear(self, light: Float32Array) -> None:
         """Lay see-through surfaces over what is behind them, the farthest first."""
-        batches = [
-            batch[batch.nearness > self.nearness[batch.pixels]]
-            for batch in fragments(self.clear.screen, self.width, self.height)
-        ]
-        if not batches:
-            return
-        found = Fragments(*(np.concatenate([getattr(b, n) for b in batches]) for n in Fragments.__annotations__))
-        order = np.lexsort((found.nearness, found.pixels))
-        found = found[order]
-        shaded, facing = self._shaded(self.clear, found)
+        found = in_front_of(self.nearness, self.clear.screen, self.width, self.height)
+        shaded, facing = self._shaded(self.clear, found, shadow=self.shadow)
         opacity = self.clear.colours[found.triangles, 3]
-        opacity = opacity + (1.0 - opacity) * 0.75 * (1.0 - np.clip(facing, 0.0, 1.0)) ** 3
-        first = np.flatnonzero(np.diff(found.pixels, prepend=-1))
-        rank = np.arange(len(found.pixels)) - np.repeat(first, np.diff(np.append(first, len(found.pixels))))
-        for layer in range(int(rank.max(initial=-1)) + 1):
-            rows = rank == layer
-            pixels, alpha = found.pixels[rows], opacity[rows, None]
-            light[pixels] = (1.0 - alpha) * light[pixels] + alpha * shaded[rows]
+        opacity = opacity + (1.0 - opacity) * RIM * (1.0 - facing) ** 3
+        _core.lay_over(light, found.pixels, opacity, shaded)
 
     def _paint_marks(self, light: Float32Array) -> None:
         """Let contact points and normals show through what hides them."""
         found = nearest(self.marks.screen, self.width, self.height)
         found = found[found.nearness < self.nearness[found.pixels] - 1e-6]
-        shaded = self._shaded(self.marks, found, shadows=False)[0]
-        alpha = self.marks.colours[found.triangles, 3:]
-        light[found.pixels] = (1.0 - alpha) * light[found.pixels] + alpha * shaded
+        shaded = self._shaded(self.marks, found, shadow=None)[0]
+        _core.lay_over(light, found.pixels, self.marks.colours[found.triangles, 3], shaded)

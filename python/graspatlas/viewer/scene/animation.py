@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from graspatlas.support.arrays import Array, BoolArray, IntArray
 from graspatlas.viewer.scene.camera import Camera
-from graspatlas.viewer.scene.scene import Colour, Part, fitted_camera, vertices_of
+from graspatlas.viewer.scene.scene import Colour, Part, fitted_camera, outermost, vertices_of
 
 __all__ = ["MAX_FRAMES", "Film", "Label", "Readout", "evenly_chosen"]
 
@@ -101,11 +100,9 @@ class Film:
     @cached_property
     def outline(self) -> Array:
         """Corners of the convex hull of what must be in the picture (n, 3): where these are, all else is."""
-        points = np.concatenate([vertices_of(self.frame(int(i)), SEEN) for i in evenly_chosen(len(self), LOOKS)])
-        try:
-            return np.asarray(points[ConvexHull(points).vertices])
-        except QhullError:  # all in one plane
-            return points
+        return outermost(
+            np.concatenate([vertices_of(self.frame(int(i)), SEEN) for i in evenly_chosen(len(self), LOOKS)])
+        )
 
 
 def evenly_chosen(n: int, most: int) -> IntArray:

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
-
+from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.body import Body
 from graspatlas.hand.mesh_files import check_meshes
 from graspatlas.problem.problem import Problem
 from graspatlas.support.arrays import Array
-from graspatlas.viewer.scene.meshes import Mesh, from_coal
+from graspatlas.viewer.scene.meshes import Mesh, from_shape
 from graspatlas.viewer.scene.stick_figure import Shape, bones, outlines
 
-if TYPE_CHECKING:
-    import pinocchio as pin
-
 __all__ = ["BodyShapes"]
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A mesh of a body: the link that carries it, its placement there and at rest in the root (4, 4), its colour."""
+
+    mesh: Mesh
+    link: str
+    T_link_shape: Array
+    T_root_shape: Array
+    colour: tuple[float, float, float, float]
 
 
 class BodyShapes:
@@ -39,54 +47,42 @@ class BodyShapes:
 
     def hand(self, q: Array) -> Iterator[Shape]:
         """The hand at joint configuration q (nq,)."""
-        if not self._hand[1].ngeoms:
-            return bones(self._problem, self._hand[0], q)
-        return self._placed(*self._hand, q)
+        if not self._hand:
+            return bones(self._problem, q)
+        placements = self._problem.hand.link_placements(q)
+        return ((part.mesh, placements[part.link] @ part.T_link_shape, part.colour) for part in self._hand)
 
     def object(self) -> Iterator[Shape]:
         """The object in its own frame."""
-        if not self._object[1].ngeoms:
+        if not self._object:
             return outlines(self._problem)
-        return self._placed(*self._object, None)
+        return ((part.mesh, part.T_root_shape, part.colour) for part in self._object)
 
-    def _read(self, body: Body) -> tuple[pin.Model, pin.GeometryModel, list[Mesh | None]]:
-        """Pinocchio's model and geometry, and the meshes; collision shapes where a body has no visual ones."""
-        import pinocchio as pin
-
+    def _read(self, body: Body) -> list[_Part]:
+        """The meshes of a body; its collision shapes where it has no visual ones."""
         check_meshes(body)
         try:
-            model = pin.buildModelFromXML(body.tree)
-            for kind in (pin.VISUAL, pin.COLLISION):
-                geometry = pin.buildGeomFromUrdfString(model, body.urdf, kind, package_dirs=list(body.package_dirs))
-                if geometry.ngeoms:
-                    break
-        except (ValueError, RuntimeError) as error:
-            reason = " ".join(str(error).rpartition("message: ")[2].split())
+            tables = _core.read_visual_shapes(body.tree, body.urdf, list(body.package_dirs))
+        except GraspAtlasError as error:
             raise GraspAtlasError(
-                f"cannot show '{body.name}' ({body.urdf_path or 'URDF text'}): {reason} "
+                f"cannot show '{body.name}' ({body.urdf_path or 'URDF text'}): {' '.join(str(error).split())} "
                 f"(package:// paths are looked up in {', '.join(body.package_dirs) or 'no folder'}); "
                 "correct the path, or save the mesh as OBJ or STL"
             ) from None
-        return model, geometry, [self._mesh(item) for item in geometry.geometryObjects]
-
-    def _mesh(self, item: pin.GeometryObject) -> Mesh | None:
-        if not hasattr(item.geometry, "tri_indices"):
-            return from_coal(item.geometry)
-        key = (item.meshPath, *item.meshScale)
-        if key not in self._files:
-            self._files[key] = from_coal(item.geometry)
-        return self._files[key]
-
-    @staticmethod
-    def _placed(
-        model: pin.Model, geometry: pin.GeometryModel, meshes: list[Mesh | None], q: Array | None
-    ) -> Iterator[Shape]:
-        import pinocchio as pin
-
-        data, geometry_data = model.createData(), geometry.createData()
-        pin.forwardKinematics(model, data, pin.neutral(model) if q is None else np.asarray(q, float))
-        pin.updateGeometryPlacements(model, data, geometry, geometry_data)
-        for item, mesh, placement in zip(geometry.geometryObjects, meshes, geometry_data.oMg, strict=True):
+        parts = []
+        for table in tables:
+            mesh = self._mesh(table)
             if mesh is not None:
-                red, green, blue, opacity = (float(c) for c in item.meshColor)
-                yield mesh, np.array(placement.homogeneous), (red, green, blue, opacity)
+                red, green, blue, opacity = map(float, table["colour"])
+                at = (table["link"], table["in_link"], table["at_rest"])
+                parts.append(_Part(mesh, *at, (red, green, blue, opacity)))
+        return parts
+
+    def _mesh(self, table: dict[str, Any]) -> Mesh | None:
+        shape = (table["kind"], table["sizes"], table["points"], table["triangles"])
+        if table["kind"] != "mesh":
+            return from_shape(*shape)
+        key = (table["file"], *table["scale"])
+        if key not in self._files:
+            self._files[key] = from_shape(*shape)
+        return self._files[key]

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csr_array
 
-from graspatlas.support.arrays import Array, IntArray
-
-if TYPE_CHECKING:
-    import coal
+from graspatlas import _core
+from graspatlas.support.arrays import AnyArray, Array, IntArray
 
 __all__ = [
     "Mesh",
@@ -22,7 +18,7 @@ __all__ = [
     "capsule",
     "ellipsoid",
     "frame_along",
-    "from_coal",
+    "from_shape",
     "lathe",
     "merged",
     "smooth",
@@ -65,26 +61,10 @@ def smooth(vertices: ArrayLike, faces: ArrayLike, crease: float = CREASE) -> Mes
     """
     points = np.asarray(vertices, float)
     triangles = np.asarray(faces, np.int64)
-    sides = points[np.roll(triangles, -1, axis=1)] - points[triangles]
-    normals = np.cross(sides[:, 0], sides[:, 1])
-    areas = np.linalg.norm(normals, axis=1)
-    triangles, sides = triangles[areas > 0.0], sides[areas > 0.0]
-    normals = normals[areas > 0.0] / areas[areas > 0.0, None]
-
-    sides /= np.linalg.norm(sides, axis=2, keepdims=True)
-    cosines = -np.sum(sides * np.roll(sides, 1, axis=1), axis=2)
-    angles = np.arccos(np.clip(cosines, -1.0, 1.0)).ravel()
-
+    sides = points[triangles[:, 1:]] - points[triangles[:, :1]]
+    triangles = triangles[np.cross(sides[:, 0], sides[:, 1]).any(axis=1)]
     corner_vertex = triangles.ravel()
-    n = len(corner_vertex)
-    incidence = csr_array((np.ones(n), (corner_vertex, np.arange(n))), shape=(len(points), n))
-    pairs = (incidence.T @ incidence).tocoo()
-    row, column = pairs.coords[0], pairs.coords[1]
-    near = np.sum(normals[row // 3] * normals[column // 3], axis=1) > np.cos(crease)
-    weights = csr_array((angles[column[near]], (row[near], column[near] // 3)), shape=(n, n // 3))
-    corner_normals = np.asarray(weights @ normals)
-    corner_normals /= np.linalg.norm(corner_normals, axis=1, keepdims=True)
-
+    corner_normals = np.asarray(_core.corner_normals(points, triangles, crease)).reshape(-1, 3)
     keys = np.column_stack([corner_vertex, np.round(200.0 * corner_normals).astype(np.int64)])
     _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     return Mesh(points[corner_vertex[first]], corner_normals[first], inverse.reshape(-1, 3))
@@ -187,23 +167,23 @@ def frame_along(direction: Array, origin: Array) -> Array:
     return T
 
 
-def from_coal(geometry: coal.CollisionGeometry) -> Mesh | None:
-    """Mesh of a collision library's geometry; None for one that has no surface to show.
+def from_shape(kind: str, sizes: Sequence[float], points: Array, triangles: AnyArray) -> Mesh | None:
+    """Mesh of a shape of a URDF; None for one that has no surface to show.
 
     Args:
-        geometry: As Pinocchio's URDF parser makes it: a mesh, a box, a sphere, a cylinder, a capsule.
+        kind: ``"mesh"``, ``"box"``, ``"sphere"``, ``"cylinder"`` or ``"capsule"``, the last two about z.
+        sizes: Radius; radius and length, of a capsule between the ends' centres; edges [m].
+        points: Vertices of a mesh (n, 3), metres.
+        triangles: Corners of its triangles (t, 3).
     """
-    kind = type(geometry).__name__
-    if hasattr(geometry, "tri_indices"):
-        corners = [geometry.tri_indices(i) for i in range(geometry.num_tris)]
-        return smooth(np.array(geometry.vertices()), [(c[0], c[1], c[2]) for c in corners])
-    if kind == "Box":
-        return box(2.0 * np.asarray(geometry.halfSide))
-    if kind == "Sphere":
-        return ellipsoid(np.full(3, geometry.radius))
-    if kind == "Cylinder":
-        r, h = geometry.radius, geometry.halfLength
-        return lathe([[0.0, -h], [r, -h], [r, h], [0.0, h]])
-    if kind == "Capsule":
-        return capsule(geometry.radius, geometry.halfLength)
-    return None
+    first, second = float(sizes[0]), float(sizes[1])
+    if kind == "mesh":
+        return smooth(points, triangles)
+    if kind == "box":
+        return box(sizes)
+    if kind == "sphere":
+        return ellipsoid(np.full(3, first))
+    if kind == "cylinder":
+        h = 0.5 * second
+        return lathe([[0.0, -h], [first, -h], [first, h], [0.0, h]])
+    return capsule(first, 0.5 * second) if kind == "capsule" else None

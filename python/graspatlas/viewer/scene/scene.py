@@ -7,6 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
+from graspatlas.collision.hulls import hull_of
+from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasp import Grasp
 from graspatlas.problem.object_joint import ObjectJoint
 from graspatlas.result.grasp_atlas import GraspAtlas
@@ -28,6 +30,7 @@ __all__ = [
     "direction_to",
     "fitted_camera",
     "grasp_parts",
+    "outermost",
     "size_of",
     "subject_of",
     "vertices_of",
@@ -150,6 +153,7 @@ def direction_to(subjects: list[Subject], joint: ObjectJoint) -> Array:
 def fitted_camera(points: Array, direction: Array, aspect: float, window: tuple[float, float, float, float]) -> Camera:
     """Camera that shows points (n, 3) from a direction (3,) in a window of its picture; see :meth:`Scene.camera`."""
     low, high = np.array([window[0], window[2]]), np.array([window[1], window[3]])
+    points = outermost(points)
     camera = Camera(points.mean(axis=0), direction, 1.0)
     for _ in range(MAX_FRAMING_STEPS):
         seen = camera.project(points, aspect)[:, :2]
@@ -161,6 +165,14 @@ def fitted_camera(points: Array, direction: Array, aspect: float, window: tuple[
         if abs(size - 1.0) < 1e-8 and np.abs(shift).max() < 1e-8:
             break
     return camera
+
+
+def outermost(points: Array) -> Array:
+    """Corners of the convex hull of points (n, 3): what shows these shows all. Points of a plane are all kept."""
+    try:
+        return np.asarray(points[hull_of(points).corners])
+    except GraspAtlasError:
+        return points
 
 
 def body_parts(shapes: BodyShapes, grasp: Grasp) -> list[Part]:

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from graspatlas.problem.problem import Problem
 from graspatlas.support.arrays import Array
 from graspatlas.viewer.scene.meshes import Mesh, capsule, ellipsoid, frame_along, smooth, tube
-
-if TYPE_CHECKING:
-    import pinocchio as pin
 
 __all__ = ["Shape", "bones", "outlines"]
 
@@ -29,15 +25,14 @@ STEPS = 40
 CUT = 0.03
 
 
-def bones(problem: Problem, model: pin.Model, q: Array) -> Iterator[Shape]:
+def bones(problem: Problem, q: Array) -> Iterator[Shape]:
     """A hand's joints, and the lines between them and to the fingertips, in the palm's frame.
 
     Args:
         problem: The problem.
-        model: Pinocchio's model of the hand.
-        q: Its joint configuration (nq,).
+        q: The hand's joint configuration (nq,).
     """
-    joints, lines = _skeleton(problem, model, q)
+    joints, lines = _skeleton(problem, q)
     size = bone_length(problem)
     ball = ellipsoid(np.full(3, JOINT_RADIUS * size), 24)
     for joint in joints:
@@ -53,17 +48,15 @@ def bones(problem: Problem, model: pin.Model, q: Array) -> Iterator[Shape]:
 
 def bone_length(problem: Problem) -> float:
     """Mean length of the hand's bones at x1, metres."""
-    import pinocchio as pin
-
-    model = pin.buildModelFromXML(problem.hand.tree)
-    lines = _skeleton(problem, model, problem.x1_array[: model.nq])[1]
+    lines = _skeleton(problem, problem.x1_array[: problem.hand.model.hand_q_size])[1]
     return float(np.mean([np.linalg.norm(end - start) for start, end in lines]))
 
 
-def _skeleton(problem: Problem, model: pin.Model, q: Array) -> tuple[list[Array], list[tuple[Array, Array]]]:
+def _skeleton(problem: Problem, q: Array) -> tuple[list[Array], list[tuple[Array, Array]]]:
     """Origins of the joints, and both ends of the bones."""
-    import pinocchio as pin
+    import pinocchio as pin  # slow to import
 
+    model = pin.buildModelFromXML(problem.hand.tree)
     data = model.createData()
     pin.forwardKinematics(model, data, np.asarray(q, float))
     joints = [np.array(placement.translation) for placement in data.oMi]

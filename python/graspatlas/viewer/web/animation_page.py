@@ -10,8 +10,8 @@ from importlib import resources
 from string import Template
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from graspatlas.numerics.rotations import quaternions_from_matrices
 from graspatlas.support.validation import PlainTable
 from graspatlas.viewer.render.text_images import DARK, GREY, text_image
 from graspatlas.viewer.scene.animation import Film
@@ -125,7 +125,7 @@ def film_animation(film: Film) -> Command:
         scale = np.linalg.norm(T[:, :3, 0], axis=1)[:, None, None]
         tracks = {
             ".position": ("vector3", T[:, :3, 3]),
-            ".quaternion": ("quaternion", Rotation.from_matrix(T[:, :3, :3] / scale).as_quat()),
+            ".quaternion": ("quaternion", quaternions_from_matrices(T[:, :3, :3] / scale)),
         }
         if np.ptp(scale) > 0.0:
             tracks[".scale"] = ("vector3", np.repeat(scale[:, :, 0], 3, axis=1))

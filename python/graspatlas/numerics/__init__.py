@@ -1,0 +1,1 @@
+"""Small numerics: rotations, and groups of linked things."""
