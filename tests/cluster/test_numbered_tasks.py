@@ -117,9 +117,7 @@ def test_an_error_of_the_package_is_passed_on_as_it_is(client: dask.Client) -> N
         next(tasks(client, refuses).results(count(), NEVER))
 
 
-def test_workers_may_come_late_and_more_of_them_get_more(
-    client: dask.Client, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_workers_may_come_late_and_more_of_them_get_more(client: dask.Client, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("graspatlas.cluster.numbered_tasks.ASK_SECONDS", 0.1)
     with (
         dask.LocalCluster(n_workers=0, threads_per_worker=1, processes=False, dashboard_address=None) as local,
