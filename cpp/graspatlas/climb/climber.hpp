@@ -62,6 +62,10 @@ class Climber {
   static constexpr double kConverged = 1e-6;  ///< largest residual of a climb that has converged
 
  private:
+  static constexpr double kMet = 0.5e-8;     // a slack may miss the inside of a requirement by so much
+  static constexpr double kShort = 1e-4;     // trust radius below which refused steps are seen as kinks
+  static constexpr double kCutReach = 20.0;  // cuts farther away than so many trust radii are dropped
+
   struct Point {
     std::vector<double> x;
     double value = 0.0;
