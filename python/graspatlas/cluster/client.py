@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
@@ -42,7 +43,8 @@ def connected(scheduler: str | None, workers: int) -> Iterator[dask.Client]:
     """A client, closed in the end, and with it the workers that were started for it.
 
     Args:
-        scheduler: Address of a scheduler; None for workers on this machine.
+        scheduler: Address of a scheduler; None for workers on this machine. Where it has none yet, a warning says so:
+            what is submitted waits for them.
         workers: How many of these.
 
     Raises:
@@ -50,6 +52,12 @@ def connected(scheduler: str | None, workers: int) -> Iterator[dask.Client]:
     """
     if scheduler is not None:
         with _client(scheduler) as client:
+            if not client.nthreads():
+                warnings.warn(
+                    f"the Dask scheduler at '{scheduler}' has no workers yet; start some with: dask worker {scheduler}",
+                    RuntimeWarning,
+                    stacklevel=2,
+                )
             yield client
         return
     with safe_path():

@@ -79,8 +79,9 @@ def local_cluster(workers: int) -> dask.LocalCluster:
 
     try:
         with _deaf_to_ctrl_c(), nullcontext() if KNOWS_SAFE_PATH else _empty_folder():
+            # What fails is raised to the caller; what workers say while they are closed is of no use.
             cluster = dask.LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs="ERROR"
+                n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs="CRITICAL"
             )
     except RuntimeError as error:
         raise GraspAtlasError(

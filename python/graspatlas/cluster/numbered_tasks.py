@@ -6,7 +6,6 @@ import time
 import uuid
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
-from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Generic, TypeVar
@@ -100,9 +99,9 @@ class NumberedTasks(Generic[T]):
         seconds = min(ASK_SECONDS, max(deadline - time.perf_counter(), 0.0))
         try:
             dask.wait(running, timeout=seconds, return_when="FIRST_COMPLETED")
-        except TimeoutError:
+        except dask.TimeoutError:
             pass
-        except CancelledError:
+        except dask.CancelledError:
             raise self._lost() from None
 
     def _result(self, number: int, future: dask.Future) -> T:
@@ -112,7 +111,7 @@ class NumberedTasks(Generic[T]):
             found: T = future.result()
         except GraspAtlasError:
             raise
-        except CancelledError:
+        except dask.CancelledError:
             raise self._lost() from None
         except dask.KilledWorker as error:
             raise GraspAtlasError(
