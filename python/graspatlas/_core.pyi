@@ -192,11 +192,33 @@ class Polytope:
         """
         Tag of the facets that a bound makes.
         """
+    @staticmethod
+    def lists_all(dimension: typing.SupportsInt | typing.SupportsIndex) -> bool:
+        """
+        Whether the polytopes of an atlas of this dimension list all vertices.
+        """
+    @staticmethod
+    def vertices_of(
+        half_width: typing.SupportsFloat | typing.SupportsIndex,
+        normals: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        offsets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Vertices [n x k] of a box that half-spaces cut: unit normals [m x k], offsets [m].
+        """
     def __init__(
         self,
         dimension: typing.SupportsInt | typing.SupportsIndex,
         half_width: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> None: ...
+        outer: bool = False,
+    ) -> None:
+        """
+        The box [-half_width, half_width]^dimension; with `outer`, vertices outside a ball alone are listed.
+        """
+    def close(self, vertex: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        The vertex is not to be expanded.
+        """
     def contains(
         self,
         u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -213,6 +235,10 @@ class Polytope:
     ) -> bool:
         """
         Keep normal . u <= offset; False if nothing is cut off.
+        """
+    def expandable_vertex(self, radius: typing.SupportsFloat | typing.SupportsIndex) -> int:
+        """
+        Index of the farthest vertex outside the ball that was not closed, or -1; where `outer` vertices are listed this lists them first: all of them if they are closed.
         """
     @property
     def vertices(self) -> numpy.typing.NDArray[numpy.float64]:

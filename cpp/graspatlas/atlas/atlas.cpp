@@ -205,9 +205,11 @@ void Atlas::put_back_charts(const Checkpoint& saved) {
 
 void Atlas::put_back_closed_vertices(const Checkpoint& saved) {
   const int k = system_.dimension();
+  Polytope::Scratch scratch;
   for (std::size_t i = 0; i < saved.closed_charts.size(); ++i) {
     Chart& chart = charts_[saved.closed_charts[i]];
     const double* u = &saved.closed_vertices[i * static_cast<std::size_t>(k)];
+    if (!chart.closed) chart.polytope.list_outer(options_.radius, scratch);
     int v = 0;
     while (v < chart.polytope.vertex_count() && !std::equal(u, u + k, chart.polytope.vertex(v))) ++v;
     if (v == chart.polytope.vertex_count()) throw Error("the checkpoint is damaged, or of another version");
