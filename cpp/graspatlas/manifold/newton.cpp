@@ -18,6 +18,8 @@ constexpr int kMostIterations = 10;
 // As near the manifold as this the factorisation serves for the remaining steps, which converge at once, and for the
 // tangent basis [units of the tangent space].
 constexpr double kNearlyZero = 1e-7;
+// Steps with a factorisation from before must become shorter by this factor, or one is made anew.
+constexpr double kFast = 0.25;
 // Rounding of an equation beside the numbers in x, which no step can make smaller.
 constexpr double kRounding = 1e-14;
 // A Jacobian whose smallest singular value is this far below its largest has lost rank.
@@ -106,7 +108,6 @@ bool Newton::factorize(const double* Phi) {
 }
 
 Projection Newton::project(double* x, const double* Phi) {
-  const int n = system_.tangent_size();
   bool nearly = false;  // the last factorisation was made nearly at the solution: it finishes the work
   double previous = HUGE_VAL;
   for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
@@ -118,13 +119,40 @@ Projection Newton::project(double* x, const double* Phi) {
     if (iteration >= 2 && distance > 10.0 * previous) return Projection::not_converged;
     previous = distance;
     nearly = nearly || distance <= kNearlyZero;
-    for (std::size_t e = 0; e < R_.size(); ++e) step_[e] = -R_[e] * inverse_sizes_[e];
-    std::fill(step_.begin() + static_cast<long>(R_.size()), step_.end(), 0.0);
-    solver_.solve(step_.data());
-    double squared = 0.0;
-    for (int i = 0; i < n; ++i) squared += step_[i] * step_[i];
+    if (!std::isfinite(step_down(x))) return Projection::not_converged;
+  }
+  return Projection::not_converged;
+}
+
+// A step from x with the residual and the factorisation that there are; its squared length. Where that is not finite x
+// stays.
+double Newton::step_down(double* x) {
+  for (std::size_t e = 0; e < R_.size(); ++e) step_[e] = -R_[e] * inverse_sizes_[e];
+  std::fill(step_.begin() + static_cast<long>(R_.size()), step_.end(), 0.0);
+  solver_.solve(step_.data());
+  double squared = 0.0;
+  for (const double s : step_) squared += s * s;
+  if (std::isfinite(squared)) system_.integrate(x, step_.data(), x);
+  return squared;
+}
+
+// With the same factorisation as long as steps become shorter fast enough.
+Projection Newton::project_nearly(double* x, const double* Phi, double enough) {
+  double squared = HUGE_VAL;
+  bool held = false;
+  for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
+    if (held) {
+      system_.residual(x, R_.data());
+    } else {
+      if (!std::isfinite(linearize(x))) return Projection::not_converged;
+      if (!factorize(Phi)) return Projection::singular;
+    }
+    const double before = squared;
+    squared = step_down(x);
     if (!std::isfinite(squared)) return Projection::not_converged;
-    system_.integrate(x, step_.data(), x);
+    if (squared <= enough * enough) return Projection::converged;
+    if (iteration >= 2 && squared > 100.0 * before) return Projection::not_converged;
+    held = iteration == 0 || squared < kFast * kFast * before;
   }
   return Projection::not_converged;
 }
@@ -167,14 +195,7 @@ bool Newton::hold(const double* x, const double* Phi) { return std::isfinite(lin
 
 bool Newton::approach(double* x) {
   system_.residual(x, R_.data());
-  double squared = 0.0;
-  for (std::size_t e = 0; e < R_.size(); ++e) step_[e] = -R_[e] * inverse_sizes_[e];
-  std::fill(step_.begin() + static_cast<long>(R_.size()), step_.end(), 0.0);
-  solver_.solve(step_.data());
-  for (const double s : step_) squared += s * s;
-  if (!std::isfinite(squared)) return false;
-  system_.integrate(x, step_.data(), x);
-  return true;
+  return std::isfinite(step_down(x));
 }
 
 bool Newton::tangent_basis(double* Phi) {
