@@ -355,6 +355,10 @@ class AtlasBuilder:
         """
         All that is needed to go on later, as arrays, with the charts from `first` on.
         """
+    def take_arrays(self) -> dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]]:
+        """
+        The same, for which the builder gives its own memory back: nothing but counts can be asked of it any more.
+        """
     @property
     def audit_holes(self) -> int:
         """
@@ -374,11 +378,6 @@ class AtlasBuilder:
     def complete(self) -> bool:
         """
         True when no chart is left to expand.
-        """
-    @property
-    def n_array_bytes(self) -> int:
-        """
-        Memory that its arrays would take, at most.
         """
     @property
     def n_bytes(self) -> int:

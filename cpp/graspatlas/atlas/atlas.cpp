@@ -79,14 +79,6 @@ std::int64_t Atlas::bytes() const {
   return sum;
 }
 
-std::int64_t Atlas::array_bytes() const {
-  // A centre, a basis and a residual; the polytopes; two numbers for each neighbour in a list.
-  const std::int64_t numbers = system_.configuration_size() + system_.dimension() * system_.tangent_size() + 1;
-  std::int64_t sum = count() * numbers * static_cast<std::int64_t>(sizeof(double));
-  for (const Worker& worker : workers_) sum += worker.expander->polytope_bytes() + 2 * worker.expander->list_bytes();
-  return sum;
-}
-
 void Atlas::expand(std::int64_t chart_limit, double seconds) {
   window_.open(chart_limit, deadline_after(seconds));
   try {

@@ -22,6 +22,9 @@ void copy_facets(const Atlas& atlas, const Polytope& p, std::int64_t first, cons
   }
 }
 
+// Charts are moved in so many parts, or in parts of so many.
+constexpr int kMoves = 64, kLeastMoved = 2048;
+
 std::int64_t count_vertices(const Polytope& p) {
   if (p.listed() == Polytope::Listed::all) return p.vertex_count();
   std::int64_t count = 0;
@@ -91,6 +94,21 @@ void flatten(const Atlas& atlas, const FlatStarts& starts, const FlatAtlas& out)
   parallel_for(atlas.threads(), atlas.count(), [&](int, std::int64_t first, std::int64_t last) {
     for (std::int64_t i = first; i < last; ++i) copy_chart(atlas, i, starts, out);
   });
+}
+
+// By slots, in which order the charts lie in memory.
+void move_flat(Atlas& atlas, const FlatStarts& starts, const FlatAtlas& out) {
+  Charts& charts = atlas.charts_to_give_back();
+  charts.forget_places();
+  const int count = charts.count(), part = std::max(kLeastMoved, count / kMoves);
+  for (int begin = 0; begin < count; begin += part) {
+    const int end = std::min(begin + part, count);
+    parallel_for(atlas.threads(), end - begin, [&](int, std::int64_t first, std::int64_t last) {
+      for (std::int64_t i = first; i < last; ++i)
+        copy_chart(atlas, atlas.number(begin + static_cast<int>(i)), starts, out);
+    });
+    charts.forget_before(end);
+  }
 }
 
 }  // namespace graspatlas

@@ -54,6 +54,8 @@ class Atlas(Light):
         radius, epsilon: r and epsilon of the paper [units of the tangent space].
         status: Whether the atlas is complete.
         seconds: Time that its construction took.
+        n_projections: Newton projections that it took, those that failed or told charts' sheets apart included; since
+            the checkpoint, if it went on from one.
         audit: How it was looked for points that no chart covers.
         centers: Chart centres x_i [n, configuration_size].
         bases: Orthonormal tangent bases Phi_i, one tangent vector a row [n, k, tangent_size].
@@ -74,6 +76,7 @@ class Atlas(Light):
     epsilon: float
     status: Status
     seconds: float
+    n_projections: int
     audit: Audit
     centers: Array
     bases: Array
@@ -367,7 +370,7 @@ class Atlas(Light):
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SCALARS}
 
 
-_SCALARS = ("system", "radius", "epsilon", "status", "seconds", "audit")
+_SCALARS = ("system", "radius", "epsilon", "status", "seconds", "n_projections", "audit")
 
 
 def shortest_way(normals: Array, excess: Array) -> Array:
