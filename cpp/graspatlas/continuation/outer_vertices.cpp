@@ -28,6 +28,7 @@ void OuterVertices::begin(int k, double radius, const HalfSpaces& half_spaces) {
   entered_count_ = 0;
   entered_.clear();
   squared_norms_.clear();
+  meets_ball_.clear();
   states_.clear();
   slopes_.resize(static_cast<std::size_t>(k));
   corner_.resize(static_cast<std::size_t>(k));
@@ -46,7 +47,7 @@ void OuterVertices::begin_with_box(int k, double radius, const HalfSpaces& half_
       positions_[at(i) + axis] = side != 0 ? half_spaces.offsets[facet] : -half_spaces.offsets[facet];
       edges(i)[axis * k + axis] = side != 0 ? -1.0 : 1.0;
     }
-    measure(i);
+    measure<0>(i);
   }
 }
 
@@ -67,7 +68,7 @@ void OuterVertices::add(const FacetIndex* facets, std::uint8_t state) {
   std::copy_n(facets, k_, &facets_[at(i)]);
   states_[i] = state;
   invert(facets, &positions_[at(i)], edges(i));
-  measure(i);
+  measure<0>(i);
 }
 
 void OuterVertices::settle(int i) { invert(facets(i), &positions_[at(i)], nullptr); }
@@ -143,7 +144,7 @@ void OuterVertices::cut_in(int half_space) {
   // outside the ball, it has been gone along from there.
   for (const int i : gone_) go_along_edges<K>(i, half_space, count);
   for (int i = 0; i < count; ++i)
-    if (!(beyond_[i] > 0.0)) go_along_edges<K>(i, half_space, count);
+    if (!(beyond_[i] > 0.0) && meets_ball_[i] != 0) go_along_edges<K>(i, half_space, count);
   for (auto i = gone_.rbegin(); i != gone_.rend(); ++i) drop(*i);
   enter(half_space);
 }
@@ -218,7 +219,7 @@ void OuterVertices::branch(int i, int edge, int half_space) {
     for (int e = 0; e < k; ++e) to[c * k + e] = from[c * k + source[e]] - shares[e] * along;
     to[c * k + place] = -inverse * along;
   }
-  measure(added);
+  measure<K>(added);
 }
 
 // Whether no other vertex from `first` on has the facets of vertex i.
@@ -229,24 +230,28 @@ bool OuterVertices::is_new(int i, int first) const {
 }
 
 // Where the edges of vertex i meet the ball.
+template <int K>
 void OuterVertices::measure(int i) {
-  const double* v = vertex(i);
-  double along[kMostDimensions] = {}, lengths[kMostDimensions] = {}, squared = 0.0;
-  for (int c = 0; c < k_; ++c) {
+  const int k = K > 0 ? K : k_;
+  const double *v = vertex(i), *column = edges(i);
+  double along[K > 0 ? K : kMostDimensions] = {}, lengths[K > 0 ? K : kMostDimensions] = {}, squared = 0.0;
+  for (int c = 0; c < k; ++c, column += k) {
     squared += v[c] * v[c];
-    for (int e = 0; e < k_; ++e) {
-      const double edge = edges(i)[c * k_ + e];
-      along[e] += v[c] * edge;
-      lengths[e] += edge * edge;
+    for (int e = 0; e < k; ++e) {
+      along[e] += v[c] * column[e];
+      lengths[e] += column[e] * column[e];
     }
   }
   squared_norms_[i] = squared;
   const double outside = squared - radius_ * radius_;
-  for (int e = 0; e < k_; ++e) {
+  bool any = false;
+  for (int e = 0; e < k; ++e) {
     const double discriminant = along[e] * along[e] - lengths[e] * outside;
     const bool meets = along[e] < 0.0 && discriminant > 0.0;
     to_ball_[at(i) + e] = meets ? (-along[e] - std::sqrt(discriminant)) / lengths[e] : 0.0;
+    any = any || meets;
   }
+  meets_ball_[i] = any;
 }
 
 // A vertex more, of which only the state is set.
@@ -254,6 +259,7 @@ int OuterVertices::add_vertex() {
   const int i = count();
   states_.push_back(0);
   squared_norms_.push_back(0.0);
+  meets_ball_.push_back(0);
   if (positions_.size() < at(i + 1)) {
     const std::size_t capacity = at(2 * i + 64);
     positions_.resize(capacity);
@@ -273,10 +279,12 @@ void OuterVertices::drop(int i) {
     std::copy_n(&to_ball_[at(last)], k_, &to_ball_[at(i)]);
     std::copy_n(edges(last), k_ * k_, edges(i));
     squared_norms_[i] = squared_norms_[last];
+    meets_ball_[i] = meets_ball_[last];
     states_[i] = states_[last];
   }
   states_.pop_back();
   squared_norms_.pop_back();
+  meets_ball_.pop_back();
 }
 
 }  // namespace graspatlas

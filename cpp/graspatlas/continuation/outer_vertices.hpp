@@ -65,6 +65,7 @@ class OuterVertices {
   template <int K>
   void branch(int i, int edge, int half_space);
   bool is_new(int i, int first) const;
+  template <int K>
   void measure(int i);
   void drop(int i);
 
@@ -75,10 +76,11 @@ class OuterVertices {
   std::vector<double> entered_;
   // Of each vertex: its place [k] and facets [k]; a column for each facet, the edge that leaves it, as long as it takes
   // to come a unit away [k x k]; and how far along each edge the ball begins, 0 where the edge ends before it as far as
-  // is known [k].
+  // is known [k];
+  // and whether there is any such.
   std::vector<double> positions_, squared_norms_, edges_, to_ball_;
   std::vector<FacetIndex> facets_;
-  std::vector<std::uint8_t> states_;
+  std::vector<std::uint8_t> states_, meets_ball_;
   std::vector<double> beyond_, slopes_, corner_, matrix_;
   std::vector<int> gone_;
 };
