@@ -15,7 +15,7 @@ constexpr double kDoubt = 0.05, kGraveDoubt = 0.2;
 constexpr double kMiss = 0.1, kOff = 0.2 * kDoubt;
 // To tell that, the projection's last step may be this long, as a share of the displacement: others would be shorter by
 // about as much.
-constexpr double kNear = 0.005;
+constexpr double kNear = 0.02;
 
 }  // namespace
 

@@ -18,8 +18,6 @@ constexpr int kMostIterations = 10;
 // As near the manifold as this the factorisation serves for the remaining steps, which converge at once, and for the
 // tangent basis [units of the tangent space].
 constexpr double kNearlyZero = 1e-7;
-// Steps with a factorisation from before must become shorter by this factor, or one is made anew.
-constexpr double kFast = 0.25;
 // Rounding of an equation beside the numbers in x, which no step can make smaller.
 constexpr double kRounding = 1e-14;
 // A Jacobian whose smallest singular value is this far below its largest has lost rank.
@@ -136,23 +134,17 @@ double Newton::step_down(double* x) {
   return squared;
 }
 
-// With the same factorisation as long as steps become shorter fast enough.
 Projection Newton::project_nearly(double* x, const double* Phi, double enough) {
-  double squared = HUGE_VAL;
-  bool held = false;
+  double previous = HUGE_VAL;
   for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
-    if (held) {
-      system_.residual(x, R_.data());
-    } else {
-      if (!std::isfinite(linearize(x))) return Projection::not_converged;
-      if (!factorize(Phi)) return Projection::singular;
-    }
-    const double before = squared;
-    squared = step_down(x);
+    const double distance = linearize(x);
+    if (!std::isfinite(distance)) return Projection::not_converged;
+    if (iteration >= 2 && distance > 10.0 * previous) return Projection::not_converged;
+    previous = distance;
+    if (!factorize(Phi)) return Projection::singular;
+    const double squared = step_down(x);
     if (!std::isfinite(squared)) return Projection::not_converged;
     if (squared <= enough * enough) return Projection::converged;
-    if (iteration >= 2 && squared > 100.0 * before) return Projection::not_converged;
-    held = iteration == 0 || squared < kFast * kFast * before;
   }
   return Projection::not_converged;
 }
