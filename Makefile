@@ -38,7 +38,7 @@ sanitize: $(VENV)/.tools
 bench: $(VENV)/.tools
 	$(BIN)/python benchmarks/run.py
 
-# Against OMPL, SciPy and NumPy, and how cost grows; writes benchmarks/RESULTS.md in about five minutes.
+# Against OMPL, SciPy and NumPy, and how cost grows; writes benchmarks/RESULTS.md in about eight minutes.
 compare: $(VENV)/.tools
 	$(BIN)/python -m pip install --quiet "graspatlas[compare]"
 	$(BIN)/python benchmarks/compare.py

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from growth import Row, by_dimension, by_radius, by_threads
+from growth import PATIENCE, RADII, Row, by_dimension, by_problem_dimension, by_radius, by_threads
 from numpy_atlas import NumpyAtlas
 
 import graspatlas as ga
@@ -205,7 +205,11 @@ def growth() -> Iterator[str]:
     yield ""
     yield from growth_table("The can, k = 2, radius halved four times", by_radius("schunk_can", 2, 0.34))
     yield from growth_table("The oil bottle, k = 3, radius halved four times", by_radius("schunk_oil_bottle", 3, 0.8))
-    yield from growth_table("Unit spheres of 1 to 4 dimensions, r = 0.3, epsilon = 0.3", by_dimension(0.3))
+    yield from growth_table("Unit spheres of 1 to 6 dimensions, epsilon = 0.3", by_dimension(0.3))
+    for name in RADII:
+        yield from growth_table(
+            f"Which k can be afforded: {name}, one thread, up to {PATIENCE:g} s", by_problem_dimension(name)
+        )
     yield from growth_table("The can, k = 2, r = 0.0425, threads", by_threads("schunk_can", 2, 0.0425))
 
 

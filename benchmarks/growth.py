@@ -78,8 +78,25 @@ def by_radius(name: str, dimension: int, radius: float) -> list[Row]:
 
 
 def by_dimension(radius: float) -> list[Row]:
-    """Spheres of one to four dimensions."""
-    return [measured(f"k = {k}", sphere_atlas(k, radius)) for k in range(1, 5)]
+    """Spheres of one to six dimensions; with five and six the charts are larger."""
+    radii = {**dict.fromkeys(range(1, 5), radius), 5: 0.7, 6: 0.8}
+    return [measured(f"k = {k}, r = {r:g}", sphere_atlas(k, r)) for k, r in radii.items()]
+
+
+#: Radii with which k dimensions of a bundled problem can be covered, and the time after which that is given up [s].
+RADII = {
+    "schunk_oil_bottle": {2: 0.1, 3: 0.2, 4: 0.4, 5: 0.8, 6: 1.0},
+    "schunk_can": {2: 0.1, 3: 0.2, 4: 0.8, 5: 1.2, 6: 1.4},
+}
+PATIENCE = 60.0
+
+
+def by_problem_dimension(name: str) -> list[Row]:
+    """A bundled problem in two to six dimensions, the charts the larger the more there are."""
+    return [
+        measured(f"k = {k}, r = {radius:g}", problem_atlas(name, k, radius, threads=1, max_seconds=PATIENCE))
+        for k, radius in RADII[name].items()
+    ]
 
 
 def by_threads(name: str, dimension: int, radius: float) -> list[Row]:

@@ -1,7 +1,7 @@
-"""Instructions that the same work takes with two installations of graspatlas: `--new PYTHON`, and `--old PYTHON` if any.
+"""Instructions that the same work takes with two installations of graspatlas: `--new PYTHON` and perhaps `--old PYTHON`.
 
-Valgrind counts them, so the figures are nearly the same on any machine and however busy it is. Imports are counted apart
-and taken off; one thread works. Prints a table in Markdown; the exit status is 1 where something takes a tenth more.
+Valgrind counts them, so the figures are nearly the same on any machine and however busy it is. Imports are counted
+apart and taken off; one thread works. Prints a table in Markdown; the exit status is 1 where something takes a tenth more.
 """
 
 from __future__ import annotations
@@ -32,7 +32,15 @@ def instructions(python: str, code: str) -> int:
     Raises:
         RuntimeError: If valgrind or the code fails.
     """
-    words = ["valgrind", "--tool=cachegrind", "--cache-sim=no", f"--cachegrind-out-file={os.devnull}", python, "-c", code]
+    words = [
+        "valgrind",
+        "--tool=cachegrind",
+        "--cache-sim=no",
+        f"--cachegrind-out-file={os.devnull}",
+        python,
+        "-c",
+        code,
+    ]
     alike = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     with tempfile.TemporaryDirectory() as elsewhere:
         done = subprocess.run(words, capture_output=True, text=True, cwd=elsewhere, env={**os.environ, **alike})

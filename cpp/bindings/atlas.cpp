@@ -16,8 +16,10 @@ namespace graspatlas {
 
 namespace {
 
-/// The whole atlas as arrays; ragged parts (facets, vertices) as values and row offsets.
-ArrayTable atlas_arrays(const Atlas& atlas) {
+/// The whole atlas as arrays; ragged parts (facets, vertices) as values and row offsets. `fill` copies or moves it
+/// there.
+template <class AnyAtlas>
+ArrayTable atlas_arrays(AnyAtlas& atlas, void (*fill)(AnyAtlas&, const FlatStarts&, const FlatAtlas&)) {
   const py::ssize_t n = atlas.count(), k = atlas.system().dimension(), v = atlas.system().tangent_size();
   py::array_t<std::int64_t> facet_start(n + 1), vertex_start(n + 1), neighbour_start(n + 1);
   const FlatStarts starts{facet_start.mutable_data(), vertex_start.mutable_data(), neighbour_start.mutable_data()};
@@ -40,7 +42,7 @@ ArrayTable atlas_arrays(const Atlas& atlas) {
       vertices.mutable_data(),        closed.mutable_data(),  pairs.mutable_data()};
   {
     const py::gil_scoped_release release;
-    flatten(atlas, starts, flat);
+    fill(atlas, starts, flat);
   }
   ArrayTable out;
   out["centers"] = centers;
@@ -176,9 +178,13 @@ void bind_atlas(py::module_& module) {
       .def_property_readonly("n_settled", &Atlas::settled_count, "Charts, the first ones, whose numbers stay.")
       .def_property_readonly("n_threads", &Atlas::threads, "Threads that it uses.")
       .def_property_readonly("n_bytes", &Atlas::bytes, "Memory that it holds.")
-      .def_property_readonly("n_array_bytes", &Atlas::array_bytes, "Memory that its arrays would take, at most.")
       .def_property_readonly("n_projections", &Atlas::projections, "Newton projections so far.")
-      .def("arrays", &atlas_arrays, "The atlas as a dictionary of arrays.");
+      .def(
+          "arrays", [](const Atlas& atlas) { return atlas_arrays<const Atlas>(atlas, &flatten); },
+          "The atlas as a dictionary of arrays.")
+      .def(
+          "take_arrays", [](Atlas& atlas) { return atlas_arrays<Atlas>(atlas, &move_flat); },
+          "The same, for which the builder gives its own memory back: nothing but counts can be asked of it any more.");
 }
 
 }  // namespace graspatlas

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "bindings.hpp"
+#include "graspatlas/continuation/chart.hpp"
 #include "graspatlas/continuation/neighbours.hpp"
 #include "graspatlas/continuation/polytope.hpp"
 #include "graspatlas/errors.hpp"
@@ -238,12 +239,27 @@ void bind_systems(py::module_& module) {
       .def("__reduce__", by_arguments<Rotations>([](const Rotations&) { return py::make_tuple(); }));
 }
 
+py::array_t<double> vertices_of(double half_width, const DoubleArray& normals, const DoubleArray& offsets) {
+  if (normals.ndim() != 2) throw Error("normals must be of shape (m, k)");
+  const auto m = normals.shape(0), k = normals.shape(1);
+  const double* offset = checked_vector(offsets, m, "offsets");
+  if (!std::all_of(offset, offset + m, [](double o) { return o >= 0.0; })) throw Error("offsets must not be negative");
+  Polytope polytope(static_cast<int>(k), half_width);
+  Polytope::Scratch scratch;
+  for (py::ssize_t i = 0; i < m; ++i) polytope.cut(normals.data() + i * k, offset[i], static_cast<int>(i), scratch);
+  return copied(polytope.vertex(0), polytope.vertex_count(), k);
+}
+
 void bind_parts(py::module_& module) {
   py::class_<Polytope> polytope(module, "Polytope", "A convex polytope in R^k: a box, cut by half-spaces.");
   polytope.attr("BOX_TAG") = Polytope::kBoxTag;
   polytope.def_static("bound_tag", &Polytope::bound_tag, py::arg("bound"), "Tag of the facets that a bound makes.")
       .def_static("bound_of_tag", &Polytope::bound_of, py::arg("tag"), "The bound whose facets have a tag below -1.")
-      .def(py::init<int, double>(), py::arg("dimension"), py::arg("half_width"))
+      .def(py::init([](int dimension, double half_width, bool outer) {
+             return Polytope(dimension, half_width, outer ? Polytope::Listed::outer : Polytope::Listed::all);
+           }),
+           py::arg("dimension"), py::arg("half_width"), py::arg("outer") = false,
+           "The box [-half_width, half_width]^dimension; with `outer`, vertices outside a ball alone are listed.")
       .def(
           "cut",
           [](Polytope& p, const DoubleArray& normal, double offset, int tag) {
@@ -260,9 +276,30 @@ void bind_parts(py::module_& module) {
             return p.contains(checked_vector(u, p.dimension(), "u"), tolerance);
           },
           py::arg("u"), py::arg("tolerance") = 0.0, "True when u is inside all half-spaces.")
+      .def(
+          "expandable_vertex",
+          [](Polytope& p, double radius) {
+            Polytope::Scratch scratch;
+            return p.expandable_vertex(radius, scratch);
+          },
+          py::arg("radius"),
+          "Index of the farthest vertex outside the ball that was not closed, or -1; where `outer` vertices are listed "
+          "this lists them first: all of them if they are closed.")
+      .def(
+          "close",
+          [](Polytope& p, int vertex) {
+            if (vertex < 0 || vertex >= p.vertex_count()) throw Error("there is no vertex " + std::to_string(vertex));
+            p.close(vertex, 1);
+          },
+          py::arg("vertex"), "The vertex is not to be expanded.")
       .def_property_readonly(
           "vertices", [](const Polytope& p) { return copied(p.vertex(0), p.vertex_count(), p.dimension()); },
           "Vertices [n x k].");
+  polytope.def_static(
+      "lists_all", [](int dimension) { return listed_vertices(dimension) == Polytope::Listed::all; },
+      py::arg("dimension"), "Whether the polytopes of an atlas of this dimension list all vertices.");
+  polytope.def_static("vertices_of", &vertices_of, py::arg("half_width"), py::arg("normals"), py::arg("offsets"),
+                      "Vertices [n x k] of a box that half-spaces cut: unit normals [m x k], offsets [m].");
   py::class_<Neighbours>(module, "Neighbours", "Points that come one by one, and those within a distance of any point.")
       .def(py::init<int>(), py::arg("size"))
       .def(

@@ -219,11 +219,33 @@ class Polytope:
         """
         Tag of the facets that a bound makes.
         """
+    @staticmethod
+    def lists_all(dimension: typing.SupportsInt | typing.SupportsIndex) -> bool:
+        """
+        Whether the polytopes of an atlas of this dimension list all vertices.
+        """
+    @staticmethod
+    def vertices_of(
+        half_width: typing.SupportsFloat | typing.SupportsIndex,
+        normals: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        offsets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Vertices [n x k] of a box that half-spaces cut: unit normals [m x k], offsets [m].
+        """
     def __init__(
         self,
         dimension: typing.SupportsInt | typing.SupportsIndex,
         half_width: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> None: ...
+        outer: bool = False,
+    ) -> None:
+        """
+        The box [-half_width, half_width]^dimension; with `outer`, vertices outside a ball alone are listed.
+        """
+    def close(self, vertex: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        The vertex is not to be expanded.
+        """
     def contains(
         self,
         u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -240,6 +262,10 @@ class Polytope:
     ) -> bool:
         """
         Keep normal . u <= offset; False if nothing is cut off.
+        """
+    def expandable_vertex(self, radius: typing.SupportsFloat | typing.SupportsIndex) -> int:
+        """
+        Index of the farthest vertex outside the ball that was not closed, or -1; where `outer` vertices are listed this lists them first: all of them if they are closed.
         """
     @property
     def vertices(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -356,6 +382,10 @@ class AtlasBuilder:
         """
         All that is needed to go on later, as arrays, with the charts from `first` on.
         """
+    def take_arrays(self) -> dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]]:
+        """
+        The same, for which the builder gives its own memory back: nothing but counts can be asked of it any more.
+        """
     @property
     def audit_holes(self) -> int:
         """
@@ -375,11 +405,6 @@ class AtlasBuilder:
     def complete(self) -> bool:
         """
         True when no chart is left to expand.
-        """
-    @property
-    def n_array_bytes(self) -> int:
-        """
-        Memory that its arrays would take, at most.
         """
     @property
     def n_bytes(self) -> int:

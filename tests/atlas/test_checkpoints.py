@@ -23,7 +23,8 @@ from graspatlas.cli import main
 
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize(
-    ("name", "dimension", "radius"), [("planar_hand", 2, 0.125), ("schunk_can", 2, 0.25), ("schunk_oil_bottle", 3, 0.2)]
+    ("name", "dimension", "radius"),
+    [("planar_hand", 2, 0.125), ("schunk_can", 2, 0.25), ("schunk_oil_bottle", 3, 0.2), ("schunk_oil_bottle", 4, 0.6)],
 )
 def test_a_run_in_pieces_is_the_same(tmp_path: Path, name: str, dimension: int, radius: float, threads: int) -> None:
     problem = ga.load_problem(name)

@@ -126,6 +126,109 @@ def test_half_spaces_through_the_origin_keep_it(seed, k):
     assert [polytope.contains(p) for p in points[clear]] == inside[clear].tolist()
 
 
+def outside(vertices: np.ndarray, radius: float, margin: float = 0.0) -> np.ndarray:
+    return vertices[np.linalg.norm(vertices, axis=1) > radius + margin]
+
+
+def all_outer(polytope: Polytope, radius: float) -> np.ndarray:
+    """Vertices outside the ball of a polytope that lists only them, each closed when it is the farthest."""
+    while (vertex := polytope.expandable_vertex(radius)) >= 0:
+        polytope.close(vertex)
+    return polytope.vertices
+
+
+def bisectors(seed: int, k: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Half-spaces as neighbours make them, which leave something outside the unit ball or not."""
+    rng = np.random.default_rng(seed)
+    normals, _ = random_cuts(seed, k, count)
+    return normals, rng.uniform(0.45, 1.0, count)
+
+
+@given(st.integers(0, 10**6), st.integers(2, 4), st.integers(0, 40), st.integers(1, 4))
+def test_outer_vertices_are_those_of_the_whole_polytope_outside_the_ball(seed, k, count, parts):
+    """Whenever they are asked for on the way; the farthest is the farthest of all."""
+    normals, offsets = bisectors(seed, k, count)
+    whole, outer = Polytope(k, 1.0), Polytope(k, 1.0, outer=True)
+    for part in np.array_split(np.arange(count), parts):
+        for i in part:
+            whole.cut(normals[i], offsets[i], i)
+            outer.cut(normals[i], offsets[i], i)
+        vertex = outer.expandable_vertex(1.0)
+        expected = outside(whole.vertices, 1.0, 1e-6)
+        assert vertex >= 0 or len(expected) == 0
+        if vertex >= 0:
+            farthest = np.linalg.norm(outer.vertices[vertex])
+            assert farthest == pytest.approx(np.linalg.norm(whole.vertices, axis=1).max(), abs=1e-6)
+    found = all_outer(outer, 1.0)
+    expected = outside(whole.vertices, 1.0)
+    if len(expected) and len(found):
+        assert cKDTree(found).query(outside(expected, 1.0, 1e-6))[0].max(initial=0.0) < 1e-6
+        assert cKDTree(expected).query(outside(found, 1.0, 1e-6))[0].max(initial=0.0) < 1e-6
+    else:
+        assert len(outside(expected, 1.0, 1e-6)) == len(outside(found, 1.0, 1e-6)) == 0
+
+
+@given(st.integers(0, 10**6), st.integers(2, 4), st.integers(1, 12))
+def test_vertices_that_were_closed_stay_so_until_they_are_cut_off(seed, k, count):
+    normals, offsets = bisectors(seed, k, count)
+    outer = Polytope(k, 1.0, outer=True)
+    before = all_outer(outer, 1.0)
+    for i, (normal, offset) in enumerate(zip(normals, offsets, strict=True)):
+        outer.cut(normal, offset, i)
+        vertex = outer.expandable_vertex(1.0)
+        new = [vertex] if vertex >= 0 else []
+        kept = before[before @ normal < offset - 1e-6]
+        if len(kept):
+            assert cKDTree(outer.vertices).query(kept)[0].max() < 1e-9
+        assert all(abs(outer.vertices[v] @ normal - offset) < 1e-6 for v in new)
+        before = all_outer(outer, 1.0)
+
+
+@given(
+    st.integers(2, 5),
+    st.lists(
+        st.tuples(st.lists(st.integers(-1, 1), min_size=5, max_size=5), st.sampled_from([0.5, 1.0, 1.5])),
+        min_size=1,
+        max_size=14,
+    ),
+)
+def test_outer_vertices_where_many_facets_meet(k, cuts):
+    """Half-spaces through vertices, or twice the same: vertices that lie on more than k facets are all found."""
+    whole, outer = Polytope(k, 1.0), Polytope(k, 1.0, outer=True)
+    for direction, level in cuts:
+        n = np.array(direction[:k], float)
+        length = np.linalg.norm(n)
+        if length == 0.0:
+            continue
+        for polytope in (whole, outer):
+            polytope.cut(n / length, level / length, 0)
+    expected = outside(whole.vertices, 1.0, 1e-6)
+    found = outside(all_outer(outer, 1.0), 1.0, 1e-6)
+    assert (len(found) == 0) == (len(expected) == 0)
+    if len(expected):
+        assert same_set(found, expected, 1e-6)
+
+
+def test_outer_vertices_of_a_ball_in_six_dimensions():
+    """Tangent planes of a smaller ball: the farthest vertex is right, and none is left where the last ones cut all."""
+    rng = np.random.default_rng(5)
+    normals, _ = random_cuts(5, 6, 40)
+    outer = Polytope(6, 1.0, outer=True)
+    for i, normal in enumerate(normals):
+        outer.cut(normal, 0.6, i)
+    vertex = outer.expandable_vertex(1.0)
+    farthest = outer.vertices[vertex]
+    excess = normals @ farthest - 0.6
+    assert excess.max() < 1e-6
+    assert (np.sort(np.abs(excess))[: 6 - (np.abs(np.abs(farthest) - 1.0) < 1e-6).sum()] < 1e-6).all()
+    inside = [u for u in rng.uniform(-1.0, 1.0, (200_000, 6)) if (normals @ u <= 0.6).all()]
+    assert np.linalg.norm(inside, axis=1).max() < np.linalg.norm(farthest)
+    for direction in np.r_[np.eye(6), -np.eye(6)]:
+        outer.cut(direction, 0.4, 99)
+    assert outer.expandable_vertex(1.0) == -1
+    assert len(outer.vertices) == 0
+
+
 def test_many_half_spaces_round_a_ball():
     """More facets than bits in a word: 500 tangent planes of a ball of radius 0.5."""
     normals, _ = random_cuts(3, 3, 500)

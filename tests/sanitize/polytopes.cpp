@@ -85,7 +85,7 @@ void cut_at_random(int k, int polytopes, int cuts, unsigned seed) {
     }
     if (made.back().offset >= 1e-9) check(polytope, made, half_width, random);
     for (int c = 0; c < 5; ++c) polytope.cut(random.direction(k).data(), 0.0, c, scratch);
-    const int vertex = polytope.expandable_vertex(0.1);
+    const int vertex = polytope.expandable_vertex(0.1, scratch);
     if (vertex >= 0) polytope.close(vertex, 1);
   }
 }
@@ -101,7 +101,37 @@ void cut_round(int k, int cuts) {
     polytope.cut(made.back().normal.data(), 0.5, c, scratch);
   }
   check(polytope, made, 1.0, random);
-  require(polytope.expandable_vertex(0.5) >= 0, "a polytope round a ball has vertices outside it");
+  require(polytope.expandable_vertex(0.5, scratch) >= 0, "a polytope round a ball has vertices outside it");
+}
+
+// A polytope that lists the vertices outside the ball only, against one that lists all; asked for them now and then.
+void list_outer_at_random(int k, int polytopes, int cuts, unsigned seed) {
+  Random random(seed);
+  for (int p = 0; p < polytopes; ++p) {
+    Polytope all(k, 1.0), outer(k, 1.0, Polytope::Listed::outer);
+    Polytope::Scratch scratch;
+    std::vector<HalfSpace> made;
+    for (int c = 0; c < cuts; ++c) {
+      const HalfSpace next = troublesome(all, made, random);
+      if (next.offset < 1e-9) continue;
+      all.cut(next.normal.data(), next.offset, c, scratch);
+      outer.cut(next.normal.data(), next.offset, c, scratch);
+      made.push_back(next);
+      if (random.below(4) > 0) continue;
+      const int vertex = outer.expandable_vertex(1.0, scratch);
+      if (vertex >= 0 && random.below(2)) outer.close(vertex, 1);
+    }
+    double farthest = 0.0;
+    for (int v = 0; v < all.vertex_count(); ++v)
+      farthest = std::max(farthest, std::sqrt(dot(all.vertex(v), all.vertex(v), k)));
+    outer.list_outer(1.0, scratch);
+    double found = 0.0;
+    for (int v = 0; v < outer.vertex_count(); ++v) {
+      found = std::max(found, std::sqrt(dot(outer.vertex(v), outer.vertex(v), k)));
+      require(all.contains(outer.vertex(v), 1e-6), "outer vertices lie in every half-space");
+    }
+    require(std::abs(std::max(found, 1.0) - std::max(farthest, 1.0)) < 1e-6, "the farthest vertex is found");
+  }
 }
 
 }  // namespace
@@ -112,6 +142,9 @@ void polytopes() {
   cut_at_random(3, 150, 60, 3);
   cut_at_random(4, 40, 40, 4);
   cut_at_random(5, 6, 25, 5);
+  list_outer_at_random(2, 100, 30, 6);
+  list_outer_at_random(4, 40, 30, 7);
+  list_outer_at_random(5, 10, 25, 8);
   cut_round(2, 400);
   cut_round(3, 250);
   cut_round(4, 90);

@@ -79,14 +79,6 @@ std::int64_t Atlas::bytes() const {
   return sum;
 }
 
-std::int64_t Atlas::array_bytes() const {
-  // A centre, a basis and a residual; the polytopes; two numbers for each neighbour in a list.
-  const std::int64_t numbers = system_.configuration_size() + system_.dimension() * system_.tangent_size() + 1;
-  std::int64_t sum = count() * numbers * static_cast<std::int64_t>(sizeof(double));
-  for (const Worker& worker : workers_) sum += worker.expander->polytope_bytes() + 2 * worker.expander->list_bytes();
-  return sum;
-}
-
 void Atlas::expand(std::int64_t chart_limit, double seconds) {
   window_.open(chart_limit, deadline_after(seconds));
   try {
@@ -205,9 +197,11 @@ void Atlas::put_back_charts(const Checkpoint& saved) {
 
 void Atlas::put_back_closed_vertices(const Checkpoint& saved) {
   const int k = system_.dimension();
+  Polytope::Scratch scratch;
   for (std::size_t i = 0; i < saved.closed_charts.size(); ++i) {
     Chart& chart = charts_[saved.closed_charts[i]];
     const double* u = &saved.closed_vertices[i * static_cast<std::size_t>(k)];
+    if (!chart.closed) chart.polytope.list_outer(options_.radius, scratch);
     int v = 0;
     while (v < chart.polytope.vertex_count() && !std::equal(u, u + k, chart.polytope.vertex(v))) ++v;
     if (v == chart.polytope.vertex_count()) throw Error("the checkpoint is damaged, or of another version");

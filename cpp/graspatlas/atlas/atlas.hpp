@@ -67,10 +67,11 @@ class Atlas {
   std::int64_t projections() const;
   /// Memory that the atlas holds.
   std::int64_t bytes() const;
-  /// Memory that the numbers of all its charts take at most when they are copied.
-  std::int64_t array_bytes() const;
 
   const System& system() const { return system_; }
+
+  /// Charts by their slots, while what is copied of them is given back; the atlas cannot be used then.
+  Charts& charts_to_give_back() { return charts_; }
 
  private:
   /// What belongs to one thread.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <vector>
 
 #include "graspatlas/parallel.hpp"
 
@@ -21,6 +22,37 @@ void copy_facets(const Atlas& atlas, const Polytope& p, std::int64_t first, cons
   }
 }
 
+// Charts are moved in so many parts, or in parts of so many.
+constexpr int kMoves = 64, kLeastMoved = 2048;
+
+std::int64_t count_vertices(const Polytope& p) {
+  if (p.listed() == Polytope::Listed::all) return p.vertex_count();
+  std::int64_t count = 0;
+  for (int v = 0; v < p.vertex_count(); ++v) count += p.state(v) != 0;
+  return count;
+}
+
+// Of a polytope that does not list all vertices those that were closed, ascending: the others, and the order, depend on
+// when it was asked for them.
+void copy_vertices(const Polytope& p, std::int64_t first, const FlatAtlas& out) {
+  const int k = p.dimension();
+  if (p.listed() == Polytope::Listed::all) {
+    std::copy_n(p.vertex(0), p.vertex_count() * k, out.vertices + first * k);
+    for (int v = 0; v < p.vertex_count(); ++v) out.vertex_closed[first + v] = p.state(v);
+    return;
+  }
+  std::vector<int> order;
+  for (int v = 0; v < p.vertex_count(); ++v)
+    if (p.state(v) != 0) order.push_back(v);
+  std::sort(order.begin(), order.end(), [&p, k](int a, int b) {
+    return std::lexicographical_compare(p.vertex(a), p.vertex(a) + k, p.vertex(b), p.vertex(b) + k);
+  });
+  for (const int v : order) {
+    std::copy_n(p.vertex(v), k, out.vertices + first * k);
+    out.vertex_closed[first++] = p.state(v);
+  }
+}
+
 void copy_chart(const Atlas& atlas, std::int64_t i, const FlatStarts& starts, const FlatAtlas& out) {
   const System& system = atlas.system();
   const std::int64_t k = system.dimension(), basis_size = k * system.tangent_size();
@@ -32,9 +64,7 @@ void copy_chart(const Atlas& atlas, std::int64_t i, const FlatStarts& starts, co
   out.regularities[i] = std::abs(chart.regularity);
   out.nearly_singular[i] = chart.rank != Rank::full;
   copy_facets(atlas, p, starts.facets[i], out);
-  const std::int64_t first = starts.vertices[i];
-  std::copy_n(p.vertex(0), p.vertex_count() * k, out.vertices + first * k);
-  for (int a = 0; a < p.vertex_count(); ++a) out.vertex_closed[first + a] = p.state(a);
+  copy_vertices(p, starts.vertices[i], out);
   std::int32_t* pair = out.neighbour_pairs + 2 * starts.neighbours[i];
   for (int c = 0; c < chart.neighbour_count; ++c) {
     *pair++ = atlas.number(chart.neighbours[c]);
@@ -52,7 +82,7 @@ void write_starts(const Atlas& atlas, const FlatStarts& out) {
       const Polytope& p = chart.polytope;
       out.facets[i + 1] = 0;
       for (int a = 0; a < p.facet_slots(); ++a) out.facets[i + 1] += p.facet_active(a);
-      out.vertices[i + 1] = p.vertex_count();
+      out.vertices[i + 1] = count_vertices(p);
       out.neighbours[i + 1] = chart.neighbour_count;
     }
   });
@@ -64,6 +94,21 @@ void flatten(const Atlas& atlas, const FlatStarts& starts, const FlatAtlas& out)
   parallel_for(atlas.threads(), atlas.count(), [&](int, std::int64_t first, std::int64_t last) {
     for (std::int64_t i = first; i < last; ++i) copy_chart(atlas, i, starts, out);
   });
+}
+
+// By slots, in which order the charts lie in memory.
+void move_flat(Atlas& atlas, const FlatStarts& starts, const FlatAtlas& out) {
+  Charts& charts = atlas.charts_to_give_back();
+  charts.forget_places();
+  const int count = charts.count(), part = std::max(kLeastMoved, count / kMoves);
+  for (int begin = 0; begin < count; begin += part) {
+    const int end = std::min(begin + part, count);
+    parallel_for(atlas.threads(), end - begin, [&](int, std::int64_t first, std::int64_t last) {
+      for (std::int64_t i = first; i < last; ++i)
+        copy_chart(atlas, atlas.number(begin + static_cast<int>(i)), starts, out);
+    });
+    charts.forget_before(end);
+  }
 }
 
 }  // namespace graspatlas

@@ -29,4 +29,8 @@ void write_starts(const Atlas& atlas, const FlatStarts& out);
 /// Copies all charts in the order of the algorithm, on the atlas's threads.
 void flatten(const Atlas& atlas, const FlatStarts& starts, const FlatAtlas& out);
 
+/// The same, and gives the atlas's memory back meanwhile: it is lost. Together they take little more than the atlas
+/// did.
+void move_flat(Atlas& atlas, const FlatStarts& starts, const FlatAtlas& out);
+
 }  // namespace graspatlas

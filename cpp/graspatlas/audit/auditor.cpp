@@ -20,6 +20,8 @@ constexpr double kShortestStep = 0.05, kLongestWalkStep = 1.5;
 constexpr int kHalvings = 3;
 // Part of the random direction of a step beside the one that the walk has.
 constexpr double kRandomPart = 0.3;
+// How often a facet of a bound is chosen before one is not empty.
+constexpr int kFacetTries = 4;
 // A point of a bound's facet is this far inside the bound, as a share of the radius, where the facet hides something.
 constexpr double kHidden = 0.1;
 // Steps past a facet or beyond a vertex, as shares of the radius: the first, and the shortest before it is given up.
@@ -133,9 +135,14 @@ int Auditor::walk_along_bound(int slot, std::uint64_t seed, std::vector<Hole>& h
   if (k_ < 2) return 0;
   SplitMix64 random(seed);
   const Polytope& polytope = charts_[slot].polytope;
-  const int facet = random_bound_facet(polytope, random);
-  if (facet < 0) return 0;
-  samples_.take(polytope, facet, options_.radius);
+  int facet = -1;
+  for (int tries = 0; tries < kFacetTries; ++tries) {
+    facet = random_bound_facet(polytope, random);
+    if (facet < 0) return 0;
+    samples_.take(polytope, facet, options_.radius);
+    if (samples_.count() > 0) break;
+  }
+  if (samples_.count() == 0) return 0;
   const int sample = static_cast<int>(random.uniform() * static_cast<double>(samples_.count() * k_) / k_);
   tangent_vector(charts_.basis(slot), samples_[sample], k_, n_, step_.data());
   system_.integrate(charts_.center(slot), step_.data(), x_.data());

@@ -20,6 +20,11 @@ enum class Closed : std::uint8_t { open = 0, bounds = 1, curvature = 2, not_conv
 /// on a line the box must be wider than the ball so that it has ends outside.
 constexpr double box_half_width(int dimension, double radius) { return dimension == 1 ? 1.5 * radius : radius; }
 
+/// Which vertices the polytopes of charts list: beyond so many dimensions they have too many.
+constexpr Polytope::Listed listed_vertices(int dimension) {
+  return dimension <= 3 ? Polytope::Listed::all : Polytope::Listed::outer;
+}
+
 /// A chart: what it covers of its tangent space, and what is known of it. Its centre and tangent basis are in `Charts`.
 struct Chart {
   Polytope polytope;                ///< facets are tagged by the slots of the charts behind them

@@ -8,6 +8,7 @@
 #include "graspatlas/continuation/chart.hpp"
 #include "graspatlas/continuation/neighbours.hpp"
 #include "graspatlas/continuation/rows.hpp"
+#include "graspatlas/memory.hpp"
 #include "graspatlas/parallel.hpp"
 
 namespace graspatlas {
@@ -55,11 +56,20 @@ class Charts {
   std::vector<double>& scales() { return scales_; }
   const std::vector<double>& scales() const { return scales_; }
 
+  /// Gives memory back: that by which `near` finds charts, and the centres, bases and polytopes of the charts before
+  /// `last`, of which nothing can be asked any more.
+  void forget_places() { index_ = Neighbours(index_.size()); }
+  void forget_before(int last) {
+    for (; forgotten_ < last; ++forgotten_) (*this)[forgotten_].polytope = Polytope();
+    rows_.forget_before(static_cast<std::size_t>(last));
+    trim_heap();
+  }
+
   /// Memory that they hold, without their polytopes' arrays.
   std::int64_t bytes() const { return static_cast<std::int64_t>(charts_.bytes() + rows_.bytes()) + index_.bytes(); }
 
  private:
-  int x_size_;
+  int x_size_, forgotten_ = 0;
   Rows<Chart> charts_;
   Rows<double> rows_;  // centre and basis
   Neighbours index_;

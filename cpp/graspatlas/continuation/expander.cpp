@@ -38,7 +38,7 @@ Expander::Expander(System& system, const AtlasOptions& options, Charts& charts)
       direction_(k_),
       vertex_(k_),
       embedding_(system.embedding_size()),
-      polytope_(k_, box_half_width(k_, options.radius)) {
+      polytope_(k_, box_half_width(k_, options.radius), listed_vertices(k_)) {
   newton_.set_scales(&charts.scales());
 }
 
@@ -94,7 +94,7 @@ void Expander::start_at(const double* x, const double* Phi, ChartKey key) {
 
 bool Expander::expand(int i, ChartKey key, int most, int& made, Clock::time_point deadline) {
   while (made < most) {
-    const int vertex = charts_[i].polytope.expandable_vertex(options_.radius);
+    const int vertex = charts_[i].polytope.expandable_vertex(options_.radius, cut_scratch_);
     if (vertex < 0) {
       charts_[i].done = true;
       return true;
@@ -117,6 +117,7 @@ bool Expander::expand_vertex(int i, int vertex, ChartKey key) {
     if (reason == Closed::open) {
       add_chart(key);
       // The new neighbour cuts the vertex off; should rounding keep it, it must not be expanded again.
+      polytope.expandable_vertex(options_.radius, cut_scratch_);
       for (int u = 0; u < polytope.vertex_count(); ++u)
         if (std::equal(vertex_.begin(), vertex_.end(), polytope.vertex(u))) close(i, u, Closed::curvature);
       return true;
@@ -234,7 +235,7 @@ void Expander::meet_neighbours(int j) {
     polytope_bytes_ -= other.bytes();
     other.cut(p_ij_.data(), 0.5 * norm_ij, j, cut_scratch_);
     polytope_bytes_ += other.bytes();
-    if (charts_[i].done && charts_[i].closed && other.expandable_vertex(options_.radius) >= 0) {
+    if (charts_[i].closed && other.expandable_vertex(options_.radius, cut_scratch_) >= 0 && charts_[i].done) {
       charts_[i].done = false;
       reopened_.push_back(i);
     }

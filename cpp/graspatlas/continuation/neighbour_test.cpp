@@ -13,6 +13,9 @@ constexpr double kDoubt = 0.05, kGraveDoubt = 0.2;
 // as shares of the displacement. The first is for the curvature of the configuration space, where coordinates above one
 // centre are not those above another; sheets are apart by half of kDoubt at least.
 constexpr double kMiss = 0.1, kOff = 0.2 * kDoubt;
+// To tell that, the projection's last step may be this long, as a share of the displacement: others would be shorter by
+// about as much.
+constexpr double kNear = 0.02;
 
 }  // namespace
 
@@ -60,10 +63,10 @@ bool NeighbourTest::leads_to(const double* x_i, const double* Phi_i, const doubl
   tangent_vector(Phi_i, p, k_, n_, step_.data());
   system_.integrate(x_i, step_.data(), above_.data());
   ++projections_;
-  if (newton_.project(above_.data(), Phi_i) != Projection::converged) return false;
-  system_.difference(above_.data(), x_j, miss_.data());
   const double squared = squared_length(step_.data(), n_);
   if (!(squared > 0.0)) return true;
+  if (newton_.project_nearly(above_.data(), Phi_i, kNear * std::sqrt(squared)) != Projection::converged) return false;
+  system_.difference(above_.data(), x_j, miss_.data());
   if (squared_length(miss_.data(), n_) > kMiss * kMiss * squared) return false;
   return project_displacement(Phi_j, miss_.data(), k_, n_, in_chart_.data()) <= kOff * kOff * squared;
 }

@@ -15,6 +15,19 @@ namespace {
 // A vertex this little beyond a half-space (in units of offset + 1) is still inside it.
 constexpr double kOnPlane = 1e-12;
 
+// A vertex this little beyond a half-space is still inside it, where not all vertices are listed, as a share of the
+// radius; and by so much at least are facets moved outwards there, those of bounds less, by which points are bounded
+// more exactly.
+constexpr double kBeyond = 1e-11, kSmallMove = 1e-9, kSmallestMove = 1e-11;
+
+// A number from 0 to 1 that looks random, as those of no two facets are in any relation; the finalizer of MurmurHash3.
+inline double fraction_of(int f) {
+  auto bits = static_cast<std::uint32_t>(f) + 1;
+  bits = (bits ^ bits >> 16) * 0x85ebca6bU;
+  bits = (bits ^ bits >> 13) * 0xc2b2ae35U;
+  return (bits ^ bits >> 16) / 4294967296.0;
+}
+
 // Facets that two vertices have in common, if exactly k - 1 (an edge); both lists ascend.
 bool share_edge(const std::uint16_t* a, const std::uint16_t* b, int k, std::uint16_t* shared) {
   int i = 0, j = 0, count = 0, missed = 0;
@@ -48,14 +61,15 @@ inline void list_bits(std::uint64_t bits, int count, std::uint16_t* out) {
 
 }  // namespace
 
-Polytope::Polytope(int dimension, double half_width) {
+Polytope::Polytope(int dimension, double half_width, Listed listed) : listed_(listed) {
   if (dimension < 1 || dimension > 12)
     throw Error("polytopes have 1 to 12 dimensions, not " + std::to_string(dimension));
   reset(dimension, half_width);
 }
 
 void Polytope::reset(int dimension, double half_width) {
-  const int corners = 1 << dimension;
+  const int corners = listed_ == Listed::all ? 1 << dimension : 0;
+  began_ = false;
   if (dimension != k_ || vertex_capacity_ < corners || facet_capacity_ < 2 * dimension) {
     vertex_count_ = facet_count_ = 0;
     k_ = dimension;
@@ -67,7 +81,7 @@ void Polytope::reset(int dimension, double half_width) {
   for (int f = 0; f < 2 * k_; ++f) normals()[f * k_ + f / 2] = f % 2 ? 1.0 : -1.0;
   std::fill_n(offsets(), 2 * k_, half_width);
   std::fill_n(tags(), 2 * k_, kBoxTag);
-  std::fill_n(uses(), 2 * k_, corners / 2);
+  std::fill_n(uses(), 2 * k_, listed_ == Listed::all ? corners / 2 : 1);
   std::fill_n(states(), corners, std::uint8_t{0});
   double* position = vertices();
   FacetIndex* facet = facets();
@@ -85,6 +99,8 @@ Polytope& Polytope::operator=(const Polytope& other) {
   if (this == &other) return *this;
   storage_.reset();
   k_ = other.k_;
+  listed_ = other.listed_;
+  began_ = other.began_;
   vertex_count_ = facet_count_ = 0;
   resize(other.vertex_count_, other.facet_count_);
   vertex_count_ = other.vertex_count_;
@@ -120,7 +136,7 @@ void Polytope::resize(int vertex_capacity, int facet_capacity) {
 }
 
 int Polytope::new_facet(const double* normal, double offset, int tag) {
-  int slot = 0;
+  int slot = listed_ == Listed::all ? 0 : facet_count_;
   while (slot < facet_count_ && uses()[slot] > 0) ++slot;
   if (slot == facet_count_) {
     if (slot > std::numeric_limits<FacetIndex>::max()) throw Error("a polytope has too many facets");
@@ -134,6 +150,10 @@ int Polytope::new_facet(const double* normal, double offset, int tag) {
 }
 
 bool Polytope::cut(const double* normal, double offset, int tag, Scratch& scratch) {
+  if (listed_ == Listed::outer) {
+    new_facet(normal, offset, tag);
+    return true;
+  }
   switch (k_) {
     case 2:
       return cut_in<2>(normal, offset, tag, scratch);
@@ -269,7 +289,8 @@ void Polytope::replace(int new_count, const Scratch& scratch) {
   vertex_count_ = final_count;
 }
 
-int Polytope::expandable_vertex(double radius) const {
+int Polytope::expandable_vertex(double radius, Scratch& scratch) {
+  if (listed_ == Listed::outer) return find_outer(radius, false, scratch);
   double farthest = radius * radius;
   int found = -1;
   const double* u = vertices();
@@ -284,6 +305,89 @@ int Polytope::expandable_vertex(double radius) const {
     }
   }
   return found;
+}
+
+void Polytope::list_outer(double radius, Scratch& scratch) {
+  if (listed_ == Listed::outer) find_outer(radius, true, scratch);
+}
+
+// Lists the vertices outside the ball that there are when all half-spaces have entered, or as many as it takes for the
+// farthest vertex that is not closed to be one of the polytope; it is returned.
+int Polytope::find_outer(double radius, bool all, Scratch& scratch) {
+  if (began_ && vertex_count_ == 0) return -1;
+  begin_outer(radius, scratch);
+  OuterVertices& outer = scratch.outer;
+  int farthest = -1;
+  while (outer.count() > 0) {
+    farthest = outer.farthest_open();
+    const double* beside = farthest < 0 || all ? nullptr : outer.vertex(farthest);
+    const int next = next_to_enter(beside, kBeyond * radius, scratch.offsets);
+    if (next < 0) break;
+    outer.cut(next);
+    uses()[next] = 1;
+  }
+  if (outer.count() == 0) farthest = -1;
+  for (int i = 0; i < outer.count(); ++i)
+    if (all || i == farthest) outer.settle(i);
+  store_outer(scratch);
+  return farthest;
+}
+
+// A half-space that does not count yet: the one that a point is farthest beyond, or the first if there is no point; -1
+// when there is none.
+int Polytope::next_to_enter(const double* u, double tolerance, const std::vector<double>& offsets) const {
+  int next = -1;
+  double farthest = tolerance;
+  for (int f = 0; f < facet_count_; ++f) {
+    if (uses()[f] > 0) continue;
+    if (!u) return f;
+    double beyond = -offsets[f];
+    for (int c = 0; c < k_; ++c) beyond += normal(f)[c] * u[c];
+    if (beyond > farthest) {
+      farthest = beyond;
+      next = f;
+    }
+  }
+  return next;
+}
+
+// Makes the work space hold what is stored, unless it does. Facets are moved outwards by tiny amounts, each by its own,
+// so that no vertex lies on more than k of them.
+void Polytope::begin_outer(double radius, Scratch& scratch) {
+  const bool held = began_ && scratch.outer_of == this && scratch.outer_version == version_;
+  std::vector<double>& offsets = scratch.offsets;
+  if (!held) offsets.clear();
+  for (int f = static_cast<int>(offsets.size()); f < facet_count_; ++f)
+    offsets.push_back(offset(f) + radius * (is_bound(tag(f)) ? kSmallestMove : kSmallMove) * (1.0 + fraction_of(f)));
+  const OuterVertices::HalfSpaces half_spaces{normals(), offsets.data()};
+  OuterVertices& outer = scratch.outer;
+  if (held) {
+    outer.move_to(half_spaces);
+    for (int i = 0; i < vertex_count_; ++i) outer.set_state(i, state(i));
+  } else if (!began_) {
+    outer.begin_with_box(k_, radius, half_spaces);
+  } else {
+    outer.begin(k_, radius, half_spaces);
+    for (int f = 0; f < facet_count_; ++f)
+      if (uses()[f] > 0) outer.enter(f);
+    for (int i = 0; i < vertex_count_; ++i) outer.add(facets() + static_cast<std::ptrdiff_t>(i) * k_, state(i));
+  }
+}
+
+void Polytope::store_outer(Scratch& scratch) {
+  const OuterVertices& outer = scratch.outer;
+  began_ = true;
+  scratch.outer_of = this;
+  scratch.outer_version = ++version_;
+  vertex_count_ = 0;
+  if (outer.count() > vertex_capacity_)
+    resize(outer.count(), facet_capacity_);
+  else if (outer.count() == 0 && vertex_capacity_ > 0)
+    resize(0, facet_count_);
+  vertex_count_ = outer.count();
+  std::copy_n(outer.vertex(0), vertex_count_ * k_, vertices());
+  std::copy_n(outer.facets(0), vertex_count_ * k_, facets());
+  for (int i = 0; i < vertex_count_; ++i) states()[i] = outer.state(i);
 }
 
 bool Polytope::contains(const double* u, double tolerance) const {

@@ -1,8 +1,14 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <new>
+#include <type_traits>
+#include <utility>
+
+#include "graspatlas/memory.hpp"
 
 namespace graspatlas {
 
@@ -14,12 +20,37 @@ template <class T>
 class Rows {
  public:
   explicit Rows(int row_size) : row_size_(row_size) {}
+  ~Rows() {
+    if constexpr (!std::is_trivially_destructible_v<T>)
+      for (std::size_t i = 0; i < count_; ++i) std::destroy_n(row(i), row_size_);
+  }
+  Rows(const Rows&) = delete;
+  Rows& operator=(const Rows&) = delete;
+  Rows& operator=(Rows&& other) noexcept {
+    std::swap(row_size_, other.row_size_);
+    std::swap(count_, other.count_);
+    std::swap(blocks_, other.blocks_);
+    return *this;
+  }
 
   /// A new row [row_size]; its numbers are not set.
   T* add() {
     const std::size_t block = block_of(count_);
-    if (!blocks_[block]) blocks_[block].reset(new T[first_of(block + 1) * row_size_ - first_of(block) * row_size_]);
-    return (*this)[count_++];
+    const std::size_t rows = first_of(block + 1) - first_of(block);
+    if (!blocks_[block]) blocks_[block].reset(new std::byte[rows * row_size_ * sizeof(T)]);
+    T* const added = row(count_);
+    for (std::size_t j = 0; j < row_size_; ++j) new (added + j) T;
+    ++count_;
+    return added;
+  }
+
+  /// Gives the memory of the rows before `last` back; they must not be used any more, and items must be mere numbers.
+  void forget_before(std::size_t last) {
+    static_assert(std::is_trivially_destructible_v<T>);
+    for (std::size_t block = 0; first_of(block) < last; ++block) {
+      const std::size_t end = std::min(last, first_of(block + 1));
+      give_back(blocks_[block].get(), row(first_of(block)) + (end - first_of(block)) * row_size_);
+    }
   }
 
   T* operator[](std::size_t i) { return row(i); }
@@ -39,11 +70,11 @@ class Rows {
   }
   T* row(std::size_t i) const {
     const std::size_t block = block_of(i);
-    return &blocks_[block][(i - first_of(block)) * row_size_];
+    return reinterpret_cast<T*>(blocks_[block].get()) + (i - first_of(block)) * row_size_;
   }
 
   std::size_t row_size_, count_ = 0;
-  std::array<std::unique_ptr<T[]>, 40> blocks_;
+  std::array<std::unique_ptr<std::byte[]>, 40> blocks_;
 };
 
 }  // namespace graspatlas

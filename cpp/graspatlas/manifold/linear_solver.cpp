@@ -28,25 +28,38 @@ bool LinearSolver::factorize() {
   }
   determinant_negative_ = false;
   const double threshold = kSingular * largest;
-  for (int c = 0; c < n; ++c) {
-    int pivot = c;
-    for (int i = c + 1; i < n; ++i)
-      if (std::abs(rows_[i][c]) > std::abs(rows_[pivot][c])) pivot = i;
-    if (!(std::abs(rows_[pivot][c]) > threshold)) return false;
-    std::swap(rows_[c], rows_[pivot]);
-    std::swap(origin_[c], origin_[pivot]);
-    determinant_negative_ ^= (pivot != c) != (rows_[c][c] < 0.0);
-    const double* __restrict top = rows_[c];
-    const double inverse = 1.0 / top[c];
-    inverse_pivots_[c] = inverse;
+  int c = 0;
+  // Two columns at a time: the rows below are read and written once for both.
+  for (; c + 1 < n; c += 2) {
+    if (!choose_pivot(c, threshold)) return false;
+    const double* __restrict first = rows_[c];
     for (int i = c + 1; i < n; ++i) {
+      rows_[i][c] *= inverse_pivots_[c];
+      rows_[i][c + 1] -= rows_[i][c] * first[c + 1];
+    }
+    if (!choose_pivot(c + 1, threshold)) return false;
+    double* __restrict second = rows_[c + 1];
+    for (int j = c + 2; j < n; ++j) second[j] -= second[c] * first[j];
+    for (int i = c + 2; i < n; ++i) {
       double* __restrict below = rows_[i];
-      if (below[c] == 0.0) continue;
-      const double factor = below[c] * inverse;
-      below[c] = factor;
-      for (int j = c + 1; j < n; ++j) below[j] -= factor * top[j];
+      const double factor = below[c], other = below[c + 1] * inverse_pivots_[c + 1];
+      below[c + 1] = other;
+      for (int j = c + 2; j < n; ++j) below[j] = below[j] - factor * first[j] - other * second[j];
     }
   }
+  return c == n || choose_pivot(c, threshold);
+}
+
+// Swaps the row with the largest number in column c into its place; false when that is too small.
+bool LinearSolver::choose_pivot(int c, double threshold) {
+  int pivot = c;
+  for (int i = c + 1; i < size_; ++i)
+    if (std::abs(rows_[i][c]) > std::abs(rows_[pivot][c])) pivot = i;
+  if (!(std::abs(rows_[pivot][c]) > threshold)) return false;
+  std::swap(rows_[c], rows_[pivot]);
+  std::swap(origin_[c], origin_[pivot]);
+  determinant_negative_ ^= (pivot != c) != (rows_[c][c] < 0.0);
+  inverse_pivots_[c] = 1.0 / rows_[c][c];
   return true;
 }
 
@@ -95,13 +108,33 @@ void LinearSolver::solve_transposed(double* b) const {
 }
 
 void LinearSolver::solve(double* B, int columns) const {
-  const int n = size_;
-  permuted_.resize(static_cast<std::size_t>(n) * columns);
+  permuted_.resize(static_cast<std::size_t>(size_) * columns);
+  switch (columns) {
+    case 1:
+      return solve_columns<1>(B, 1);
+    case 2:
+      return solve_columns<2>(B, 2);
+    case 3:
+      return solve_columns<3>(B, 3);
+    case 4:
+      return solve_columns<4>(B, 4);
+    default:
+      return solve_columns<0>(B, columns);
+  }
+}
+
+// Columns is their number where the compiler may know it, else 0.
+template <int Columns>
+void LinearSolver::solve_columns(double* B, int count) const {
+  const int n = size_, columns = Columns > 0 ? Columns : count;
   double* Y = permuted_.data();
+  int first = n;  // of the rows of Y that are not zero
   for (int i = 0; i < n; ++i) {
     double* __restrict y = Y + static_cast<std::ptrdiff_t>(i) * columns;
-    std::copy_n(B + static_cast<std::ptrdiff_t>(origin_[i]) * columns, columns, y);
-    for (int j = 0; j < i; ++j) {
+    const double* b = B + static_cast<std::ptrdiff_t>(origin_[i]) * columns;
+    std::copy_n(b, columns, y);
+    if (first == n && std::any_of(b, b + columns, [](double number) { return number != 0.0; })) first = i;
+    for (int j = first; j < i; ++j) {
       const double factor = rows_[i][j];
       const double* __restrict above = Y + static_cast<std::ptrdiff_t>(j) * columns;
       for (int c = 0; c < columns; ++c) y[c] -= factor * above[c];
@@ -109,14 +142,16 @@ void LinearSolver::solve(double* B, int columns) const {
   }
   for (int i = n - 1; i >= 0; --i) {
     const double* y = Y + static_cast<std::ptrdiff_t>(i) * columns;
+    double sums[Columns > 0 ? Columns : 1];
     double* __restrict b = B + static_cast<std::ptrdiff_t>(i) * columns;
-    std::copy_n(y, columns, b);
+    double* __restrict sum = Columns > 0 ? sums : b;
+    std::copy_n(y, columns, sum);
     for (int j = i + 1; j < n; ++j) {
       const double factor = rows_[i][j];
       const double* __restrict below = B + static_cast<std::ptrdiff_t>(j) * columns;
-      for (int c = 0; c < columns; ++c) b[c] -= factor * below[c];
+      for (int c = 0; c < columns; ++c) sum[c] -= factor * below[c];
     }
-    for (int c = 0; c < columns; ++c) b[c] *= inverse_pivots_[i];
+    for (int c = 0; c < columns; ++c) b[c] = sum[c] * inverse_pivots_[i];
   }
 }
 

@@ -31,6 +31,10 @@ class LinearSolver {
   void solve(double* B, int columns) const;
 
  private:
+  bool choose_pivot(int c, double threshold);
+  template <int Columns>
+  void solve_columns(double* B, int count) const;
+
   int size_, stride_;
   bool determinant_negative_ = false;
   std::vector<double> storage_;

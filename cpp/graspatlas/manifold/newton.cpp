@@ -106,7 +106,6 @@ bool Newton::factorize(const double* Phi) {
 }
 
 Projection Newton::project(double* x, const double* Phi) {
-  const int n = system_.tangent_size();
   bool nearly = false;  // the last factorisation was made nearly at the solution: it finishes the work
   double previous = HUGE_VAL;
   for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
@@ -118,13 +117,34 @@ Projection Newton::project(double* x, const double* Phi) {
     if (iteration >= 2 && distance > 10.0 * previous) return Projection::not_converged;
     previous = distance;
     nearly = nearly || distance <= kNearlyZero;
-    for (std::size_t e = 0; e < R_.size(); ++e) step_[e] = -R_[e] * inverse_sizes_[e];
-    std::fill(step_.begin() + static_cast<long>(R_.size()), step_.end(), 0.0);
-    solver_.solve(step_.data());
-    double squared = 0.0;
-    for (int i = 0; i < n; ++i) squared += step_[i] * step_[i];
+    if (!std::isfinite(step_down(x))) return Projection::not_converged;
+  }
+  return Projection::not_converged;
+}
+
+// A step from x with the residual and the factorisation that there are; its squared length. Where that is not finite x
+// stays.
+double Newton::step_down(double* x) {
+  for (std::size_t e = 0; e < R_.size(); ++e) step_[e] = -R_[e] * inverse_sizes_[e];
+  std::fill(step_.begin() + static_cast<long>(R_.size()), step_.end(), 0.0);
+  solver_.solve(step_.data());
+  double squared = 0.0;
+  for (const double s : step_) squared += s * s;
+  if (std::isfinite(squared)) system_.integrate(x, step_.data(), x);
+  return squared;
+}
+
+Projection Newton::project_nearly(double* x, const double* Phi, double enough) {
+  double previous = HUGE_VAL;
+  for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
+    const double distance = linearize(x);
+    if (!std::isfinite(distance)) return Projection::not_converged;
+    if (iteration >= 2 && distance > 10.0 * previous) return Projection::not_converged;
+    previous = distance;
+    if (!factorize(Phi)) return Projection::singular;
+    const double squared = step_down(x);
     if (!std::isfinite(squared)) return Projection::not_converged;
-    system_.integrate(x, step_.data(), x);
+    if (squared <= enough * enough) return Projection::converged;
   }
   return Projection::not_converged;
 }
@@ -167,14 +187,7 @@ bool Newton::hold(const double* x, const double* Phi) { return std::isfinite(lin
 
 bool Newton::approach(double* x) {
   system_.residual(x, R_.data());
-  double squared = 0.0;
-  for (std::size_t e = 0; e < R_.size(); ++e) step_[e] = -R_[e] * inverse_sizes_[e];
-  std::fill(step_.begin() + static_cast<long>(R_.size()), step_.end(), 0.0);
-  solver_.solve(step_.data());
-  for (const double s : step_) squared += s * s;
-  if (!std::isfinite(squared)) return false;
-  system_.integrate(x, step_.data(), x);
-  return true;
+  return std::isfinite(step_down(x));
 }
 
 bool Newton::tangent_basis(double* Phi) {

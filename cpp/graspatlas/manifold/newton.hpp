@@ -28,6 +28,10 @@ class Newton {
   /// Phi is row-major [dimension x tangent_size]: its rows are the tangent vectors.
   Projection project(double* x, const double* Phi);
 
+  /// The same, to within about `enough` [units of the tangent space]: without the last steps, which are shorter than
+  /// that and quickly vanish. Nothing can be asked of the point afterwards.
+  Projection project_nearly(double* x, const double* Phi, double enough);
+
   /// Orthonormal tangent basis [dimension x tangent_size] at the point that `project` has just found.
   /// False when the tangent space is not well defined there.
   bool tangent_basis(double* Phi);
@@ -57,6 +61,7 @@ class Newton {
 
  private:
   double linearize(const double* x);
+  double step_down(double* x);
   bool factorize(const double* Phi);
   double tolerance(const double* x) const;
 

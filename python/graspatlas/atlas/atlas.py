@@ -53,6 +53,8 @@ class Atlas(Light):
         radius, epsilon: r and epsilon of the paper [units of the tangent space].
         status: Whether the atlas is complete.
         seconds: Time that its construction took.
+        n_projections: Newton projections that it took, those that failed or told charts' sheets apart included; since
+            the checkpoint, if it went on from one.
         audit: How it was looked for points that no chart covers.
         centers: Chart centres x_i [n, configuration_size].
         bases: Orthonormal tangent bases Phi_i, one tangent vector a row [n, k, tangent_size].
@@ -62,6 +64,9 @@ class Atlas(Light):
         nearly_singular: Charts within which the Jacobian loses rank, or falls below a tenth of that [n].
         facet_start, facet_normals, facet_offsets, facet_tags: Facets [n + 1], [f, k], [f], [f]; see ``BOX_TAG``.
         vertex_start, vertices, vertex_closed: Vertices [n + 1], [v, k], and the :class:`Closed` reason of each [v].
+            From four dimensions on, where polytopes have very many, they are only those outside the ball of the radius
+            that could not be expanded; :meth:`polytope` finds all. There half-spaces that cut nothing off are among the
+            facets, too.
         neighbour_pairs: Pairs of charts that cut each other [p, 2].
     """
 
@@ -70,6 +75,7 @@ class Atlas(Light):
     epsilon: float
     status: Status
     seconds: float
+    n_projections: int
     audit: Audit
     centers: Array
     bases: Array
@@ -126,8 +132,11 @@ class Atlas(Light):
             if kinds == "f" and not (np.abs(array.astype(float)) < LARGEST).all():
                 raise GraspAtlasError(f"array '{name}' holds a number that is not finite, or not below {LARGEST:g}")
         ends_fit = all(
-            start[0] == 0 and start[-1] == end and (np.diff(start) > k).all()
-            for start, end in ((self.facet_start, facets), (self.vertex_start, vertices))
+            start[0] == 0 and start[-1] == end and (np.diff(start) >= least).all()
+            for start, end, least in (
+                (self.facet_start, facets, k + 1),
+                (self.vertex_start, vertices, k + 1 if self.lists_all_vertices else 0),
+            )
         )
         pairs = self.neighbour_pairs
         in_order = (pairs[:, 0] < pairs[:, 1]).all() and len(np.unique(pairs, axis=0)) == len(pairs)
@@ -144,6 +153,11 @@ class Atlas(Light):
     def dimension(self) -> int:
         """k: dimension of the manifold."""
         return int(self.bases.shape[1])
+
+    @property
+    def lists_all_vertices(self) -> bool:
+        """Whether ``vertices`` holds those of the whole polytopes: below four dimensions."""
+        return _core.Polytope.lists_all(self.dimension)
 
     @property
     def box_half_width(self) -> float:
@@ -203,6 +217,10 @@ class Atlas(Light):
 
     def polytope(self, chart: int) -> Array:
         """Vertices of a chart's polytope [v, k]; in order round the polygon when k = 2."""
+        if not self.lists_all_vertices:
+            normals, offsets, tags = self.facets(chart)
+            cuts = tags != BOX_TAG
+            return _core.Polytope.vertices_of(self.box_half_width, normals[cuts], offsets[cuts])
         vertices = self.vertices[self.vertex_start[chart] : self.vertex_start[chart + 1]]
         if self.dimension == 2:
             return np.asarray(vertices[np.argsort(np.arctan2(vertices[:, 1], vertices[:, 0]))])
@@ -225,6 +243,12 @@ class Atlas(Light):
         if self.dimension == 1:
             return np.array([np.ptp(self.polytope(i)) for i in range(self.n_charts)])
         return np.array([ConvexHull(self.polytope(i)).volume for i in range(self.n_charts)])
+
+    @cached_property
+    def _vertex_counts(self) -> IntArray:
+        if self.lists_all_vertices:
+            return np.diff(self.vertex_start)
+        return np.array([len(self.polytope(i)) for i in range(self.n_charts)])
 
     @cached_property
     def neighbours(self) -> list[IntArray]:
@@ -323,7 +347,7 @@ class Atlas(Light):
             "residual": self.residuals,
             "n_neighbours": np.bincount(self.neighbour_pairs.ravel(), minlength=n),
             "n_facets": np.diff(self.facet_start),
-            "n_vertices": np.diff(self.vertex_start),
+            "n_vertices": self._vertex_counts,
         }
         for reason in Closed:
             if reason is not Closed.OPEN:
@@ -349,7 +373,7 @@ class Atlas(Light):
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SCALARS}
 
 
-_SCALARS = ("system", "radius", "epsilon", "status", "seconds", "audit")
+_SCALARS = ("system", "radius", "epsilon", "status", "seconds", "n_projections", "audit")
 
 
 def shortest_way(normals: Array, excess: Array) -> Array:

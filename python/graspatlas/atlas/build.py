@@ -98,8 +98,9 @@ def grown(
             epsilon=epsilon,
             status=status,
             seconds=time.perf_counter() - start,
+            n_projections=builder.n_projections,
             audit=audit,
-            **builder.arrays(),
+            **builder.take_arrays(),
         )
         if status is Status.COMPLETE and atlas.blocked:
             atlas = replace(atlas, status=Status.BLOCKED)

@@ -117,6 +117,9 @@ def most_samples(atlas: Atlas, spacing: float, charts: ArrayLike | None = None) 
 
 def _boxes(atlas: Atlas) -> tuple[Array, Array]:
     """Lowest and highest corner of the box round each polytope [n, k]."""
+    if not atlas.lists_all_vertices:
+        corners = [atlas.polytope(chart) for chart in range(atlas.n_charts)]
+        return np.array([c.min(axis=0) for c in corners]), np.array([c.max(axis=0) for c in corners])
     starts = atlas.vertex_start[:-1]
     return np.minimum.reduceat(atlas.vertices, starts), np.maximum.reduceat(atlas.vertices, starts)
 

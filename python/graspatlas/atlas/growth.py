@@ -21,6 +21,8 @@ __all__ = ["Growth", "outlook"]
 _SLICE_SECONDS = 0.1
 #: Work that a killed run can lose [s], but for the time that writing takes.
 _CHECKPOINT_SECONDS = 20.0
+#: What the builder's memory takes at most while its arrays are made, with what the heap needs for itself.
+_HELD = 1.3
 #: A coarse atlas that tells the size of the one being grown has this part of its charts, about.
 _COARSE_SHARE = 1 / 30
 
@@ -86,7 +88,7 @@ class Growth:
                     return Status.TIME_LIMIT
                 if builder.n_charts >= limits.charts:
                     return Status.CHART_LIMIT
-                if builder.n_bytes + builder.n_array_bytes > limits.memory:
+                if _HELD * builder.n_bytes > limits.memory:
                     return Status.MEMORY_LIMIT
                 seconds = min(_SLICE_SECONDS, left)
                 if builder.complete:

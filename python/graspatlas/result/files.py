@@ -72,6 +72,7 @@ def save_result(result: GraspAtlas, path: str | os.PathLike[str]) -> None:
         "epsilon": result.atlas.epsilon,
         "status": result.status.name,
         "seconds": result.atlas.seconds,
+        "n_projections": result.atlas.n_projections,
         "audit": asdict(result.atlas.audit),
         "quality": quality_name(result.quality),
         "quality_seconds": result.quality_seconds,
@@ -152,6 +153,7 @@ def _parts(header: StatedTable, arrays: dict[str, AnyArray], source: os.PathLike
             epsilon=number(header["epsilon"], "epsilon"),
             status=Status[header["status"]],
             seconds=number(header["seconds"], "seconds"),
+            n_projections=int(number(header.get("n_projections", 0), "n_projections")),  # older files have none
             audit=_audit(header["audit"]),
             **arrays,
         )
