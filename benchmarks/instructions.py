@@ -1,7 +1,8 @@
-"""Instructions that the same work takes with two installations of graspatlas: `--new PYTHON` and perhaps `--old PYTHON`.
+"""Instructions that the same work takes with two installations of graspatlas.
 
-Valgrind counts them, so the figures are nearly the same on any machine and however busy it is. Imports are counted
-apart and taken off; one thread works. Prints a table in Markdown; the exit status is 1 where something takes a tenth more.
+`--new PYTHON` and perhaps `--old PYTHON` name them. Valgrind counts, so the figures are nearly the same on any machine
+and however busy it is. Imports are counted apart and taken off; one thread works. Prints a table in Markdown; the exit
+status is 1 where something takes a tenth more.
 """
 
 from __future__ import annotations

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "graspatlas/audit/facet_samples.hpp"
-#include "graspatlas/random.hpp"
 #include "graspatlas/audit/rank_search.hpp"
 #include "graspatlas/audit/walker.hpp"
 #include "graspatlas/continuation/charts.hpp"
@@ -14,6 +13,7 @@
 #include "graspatlas/manifold/bound_check.hpp"
 #include "graspatlas/manifold/bound_manifold.hpp"
 #include "graspatlas/manifold/system.hpp"
+#include "graspatlas/random.hpp"
 
 namespace graspatlas {
 
