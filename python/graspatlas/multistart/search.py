@@ -120,7 +120,7 @@ class Search:
                 return self._ended(deadline) or SearchEnd.ROUNDS
             self._keep(new)
             bar.update(len(new.x))
-            self._tell(bar.set_postfix_str)
+            bar.note(self._told())
 
     def _keep(self, new: Round) -> None:
         if self.folder:
@@ -132,13 +132,13 @@ class Search:
         self.census.add(new)
         self.rounds = new.number + 1
 
-    def _tell(self, show: Callable[..., None]) -> None:
+    def _told(self) -> str:
+        """What the progress bar says of what was found."""
         best = self.census.best
         if best is None:
-            show("none meets the requirements yet", refresh=False)
-        else:
-            missing = f"{self.census.share_missing:.1%} may be missing"
-            show(f"best {best.value:.6g}, {len(self.census.peaks)} maxima, {missing}", refresh=False)
+            return "none meets the requirements yet"
+        missing = f"{self.census.share_missing:.1%} may be missing"
+        return f"best {best.value:.6g}, {len(self.census.peaks)} maxima, {missing}"
 
     def _ended(self, deadline: float) -> SearchEnd | None:
         """Why the search ends here; None where it goes on."""
