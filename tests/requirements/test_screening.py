@@ -236,8 +236,8 @@ def test_a_class_enters_itself_under_its_name():
 
 
 def test_named_requirements_are_known_wherever_a_problem_is_read():
-    """A problem reads requirements that it does not import: any import of the package enters them."""
-    code = "from graspatlas.problem.requirement import REQUIREMENTS; print(*REQUIREMENTS)"
+    """A problem reads requirements that it does not import: with the class of problems come all of them."""
+    code = "import graspatlas as ga; ga.Problem; print(*ga.problem.requirement.REQUIREMENTS)"
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert printed.split() == ["joint_margin", "force_closure", "collision_free", "holding_force"]
 
