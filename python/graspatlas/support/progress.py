@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Collection, Iterator
 from typing import TypeVar
 
@@ -16,6 +17,13 @@ T = TypeVar("T")
 QUIET_SECONDS = 1.0
 #: Time between two states of the bar on a terminal, and in a file, where each makes a line [s].
 TERMINAL_INTERVAL, FILE_INTERVAL = 0.1, 10.0
+
+
+class _Bar(tqdm):  # type: ignore[misc]
+    """A bar of this process alone: tqdm's lock is one among processes, which a worker that is killed leaves behind."""
+
+
+_Bar.set_lock(threading.RLock())
 
 
 def is_shown(progress: bool | None) -> bool:
@@ -35,7 +43,7 @@ def progress_bar(
         progress: Show it; by default when standard error is a terminal.
         initial: How many are done.
     """
-    return tqdm(
+    return _Bar(
         total=total,
         desc=what,
         unit=unit if unit == "it" else f" {unit}",
