@@ -251,3 +251,11 @@ def test_a_result_without_accepted_charts_is_drawn(problem: ga.Problem, tmp_path
     ga.save_picture(result, tmp_path / "best.png", width=320, height=180)
     ga.export_html(result, tmp_path / "best.html")
     assert (tmp_path / "best.png").stat().st_size > 5_000
+
+
+def test_what_only_the_refined_best_meets_is_exported_and_tried(problem: ga.Problem, tmp_path: Path) -> None:
+    result = ga.optimize(problem, motions="all", require=[ga.ForceClosure(0.5, 0.145)])
+    assert not result.accepted.any()
+    assert result.save_grasps(tmp_path / "best.json", best=3, refined=True) == 1
+    assert result.save_grasps(tmp_path / "accepted.json", accepted=True, refined=True) == 1
+    assert "refined" in repr(result)

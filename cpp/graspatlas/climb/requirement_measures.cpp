@@ -9,8 +9,10 @@ namespace {
 
 constexpr double kFarOpen = -1.0;     // below this the slack of closure counts by its logarithm
 constexpr double kLeastSlack = -1e6;  // where internal forces cannot press at all
-constexpr double kApart = 1e-5;       // kept beyond the distance asked for: shapes that touch have no normal [m]
-constexpr double kTouching = 1e-5;    // a fingertip this near the object touches it where it should [m]
+// Kept beyond the distance asked for [m]: shapes that are just apart have no normal, and are said to collide; of those
+// that may sink in what depths are known to.
+constexpr double kApart = 2e-6, kNotTooDeep = 5e-7;
+constexpr double kTouching = 1e-5;  // a fingertip this near the object touches it where it should [m]
 
 }  // namespace
 
@@ -103,7 +105,8 @@ DistancesMeasure::DistancesMeasure(std::shared_ptr<const CollisionScene> scene, 
       seen_(scene->pairs().size()) {}
 
 double DistancesMeasure::slack(int pair, double distance) const {
-  return (distance - scene_.pairs()[static_cast<std::size_t>(pair)].required - kApart) / length_scale_;
+  const double required = scene_.pairs()[static_cast<std::size_t>(pair)].required;
+  return (distance - required - (required < 0.0 ? kNotTooDeep : kApart)) / length_scale_;
 }
 
 // Distance of the watched points along their normal, where the model is.

@@ -88,7 +88,8 @@ def _export(options: argparse.Namespace) -> int:
     if options.table and options.table.suffix not in FRAME_ENDINGS:
         raise GraspAtlasError(f"table '{options.table}' must end in {' or '.join(FRAME_ENDINGS)}")
     result = load_result(options.result)
-    if (options.best is not None or options.accepted) and not result.accepted.any():
+    wanted = options.best is not None or options.accepted
+    if wanted and not result.accepted.any() and result.refinement is None:
         say(f"{result.problem.name}: no grasp meets the requirements, nothing was written", file=sys.stderr)
         return FAILED
     summary: PlainTable = {"problem": result.problem.name, "n_charts": result.atlas.n_charts}

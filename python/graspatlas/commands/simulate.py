@@ -59,7 +59,7 @@ def _simulate(options: argparse.Namespace) -> int:
     if options.result is None:
         raise GraspAtlasError("name the folder or file that optimize wrote, or give --self-test")
     result = load_result(options.result)
-    if not result.accepted.any() and not options.chart:
+    if not result.accepted.any() and result.refinement is None and not options.chart:
         say(f"{result.problem.name}: no grasp meets the requirements, nothing was tried", file=sys.stderr)
         return FAILED
     trials = simulate(

@@ -118,7 +118,7 @@ def select(
     elif best is not None:
         rows = _best(result, best)
     else:
-        rows = result.candidates() if accepted else np.arange(result.atlas.n_charts)
+        rows = result.accepted_charts() if accepted else np.arange(result.atlas.n_charts)
     names = [quality_name(result.quality), *result.others]
     values = [values[rows] for values in (result.qualities, *result.others.values())]
     X, flags, numbers = result.atlas.centers[rows], result.accepted[rows], rows.astype(np.int64)
@@ -139,7 +139,7 @@ def select(
 def _best(result: GraspAtlas, count: int) -> IntArray:
     """The best charts that meet the requirements, the best first; of equals the first."""
     whole(count, "best")
-    candidates = result.candidates()
+    candidates = result.accepted_charts()
     order = np.argsort(-result.qualities[candidates], kind="stable")
     return np.asarray(candidates[order[:count]], np.int64)
 

@@ -87,6 +87,8 @@ class GraspAtlas(Light):
     def __repr__(self) -> str:
         atlas = f"{self.atlas.n_charts} charts, k = {self.dimension}, {self.status}"
         best = f"{self.qualities[self.accepted].max():.6g}" if self.accepted.any() else "none, no grasp will do"
+        if self.refinement:
+            best = f"{self.refined_best.quality:.6g}, refined"
         return f"<{type(self).__name__} of {self.problem.name!r}: {atlas}; best {quality_name(self.quality)} {best}>"
 
     def __post_init__(self) -> None:
@@ -152,6 +154,14 @@ class GraspAtlas(Light):
             counts = ", ".join(f"{name} rejected {count}" for name, count in self.rejected.items())
             raise GraspAtlasError(f"none of {self.atlas.n_charts} grasps meets the requirements ({counts}): relax one")
         return np.flatnonzero(self.accepted)
+
+    def accepted_charts(self) -> IndexArray:
+        """Charts that meet the requirements, ascending; none where the refined best alone does.
+
+        Raises:
+            GraspAtlasError: If no grasp meets them.
+        """
+        return np.zeros(0, np.intp) if self.refinement and not self.accepted.any() else self.candidates()
 
     @cached_property
     def refined_best(self) -> Grasp:

@@ -109,7 +109,7 @@ def _chosen(
         if not len(numbers):
             raise GraspAtlasError("charts names none; give some, or leave it out for the best")
         return np.zeros(len(numbers), bool), numbers
-    candidates = np.asarray(result.candidates(), np.int64)
+    candidates = np.asarray(result.accepted_charts(), np.int64)
     is_refined = result.refinement is not None
     first = result.refined_best.chart if is_refined else result.best.chart
     left = candidates if is_refined else candidates[candidates != first]
