@@ -57,7 +57,7 @@ def test_results_with_other_content(stored, tmp_path, capfd, header_too, place, 
     else:
         name = sorted(arrays)[place % len(arrays)]
         array = arrays[name]
-        if whole or array.dtype.kind not in ENTRIES:
+        if whole or array.size == 0 or array.dtype.kind not in ENTRIES:
             other = [0.0, [1.0, 2.0], [[NAN]], "text", [True], []]
             arrays[name] = np.array(other[place // 100 % len(other)])
         else:
