@@ -16,10 +16,10 @@ from graspatlas.version import __version__
 __all__ = ["PINS", "in_the_way", "load", "other_versions"]
 
 #: The distributions whose libraries the core is compiled with, and their versions; as in pyproject.toml.
-PINS = {"libpinocchio": "4.1.0", "libcoal": "3.0.3"}
+PINS = {"libpinocchio": "4.1.0", "libcoal": "3.0.3", "eiquadprog": "1.3.2"}
 
 #: Libraries whose file names carry no version, so that another one may be taken for ours.
-LIBRARIES = ("libpinocchio_default", "libpinocchio_parsers", "libpinocchio_collision", "libcoal")
+LIBRARIES = ("libpinocchio_default", "libpinocchio_parsers", "libpinocchio_collision", "libcoal", "libeiquadprog")
 
 
 def in_the_way(maps: str = "/proc/self/maps") -> list[Path]:
