@@ -429,7 +429,7 @@ def test_interrupts_while_importing(program: bool, tmp_path: Path) -> None:
     script = tmp_path / ("graspatlas" if program else "mine.py")
     script.write_text("import sys\nfrom graspatlas.cli import main\nsys.exit(main(sys.argv[1:]))\n")
     silent = 0
-    for moment in (0.15, 0.3, 0.5, 0.8):
+    for moment in (0.06, 0.1, 0.15, 0.2, 0.3, 0.5):
         process = subprocess.Popen(
             [sys.executable, str(script), "list"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )

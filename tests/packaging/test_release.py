@@ -71,7 +71,7 @@ def test_the_doctor_looks_at_what_is_needed() -> None:
     needed = PROJECT.partition("\ndependencies = [")[2].partition("]")[0]
     stated = {name.lower() for name in re.findall(r'^  "([A-Za-z_-]+)', needed, re.MULTILINE)}
     assert {name.lower() for name in NEEDED} <= stated
-    assert stated - {"libpinocchio", "libcoal", "cmeel-qhull"} == {name.lower() for name in NEEDED}
+    assert stated - {"libpinocchio", "libcoal", "cmeel-qhull", "eiquadprog"} == {name.lower() for name in NEEDED}
     extras = PROJECT.partition("[project.optional-dependencies]")[2]
     for name, extra in EXTRAS.items():
         assert re.search(rf'^{extra} = \[.*"{name}', extras, re.MULTILINE), name

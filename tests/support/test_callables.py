@@ -309,7 +309,7 @@ def test_max_seconds_leaves_time_to_read(small_result: ga.Result) -> None:
 @pytest.mark.parametrize("where", ["relevant", "feasible"])
 def test_max_seconds_ends_the_climbs(small_result: ga.Result, where: str) -> None:
     def slow(grasp: ga.Grasp) -> float:
-        time.sleep(2e-3)
+        time.sleep(1e-2)
         return float(np.sin(40.0 * grasp.x).sum())
 
     start = time.perf_counter()

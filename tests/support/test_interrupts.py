@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -274,10 +275,20 @@ def many(result: ga.Result) -> ga.Grasps:
     return ga.Grasps(result.problem, np.tile(result.atlas.centers, (100, 1)), result.atlas.system)
 
 
+def slowed(result: ga.Result) -> ga.Result:
+    """The same with an index that takes long."""
+
+    def slow(grasp: ga.Grasp) -> float:
+        time.sleep(0.02)
+        return float(np.sin(40.0 * grasp.x).sum())
+
+    return replace(result, quality=slow)
+
+
 LONG: dict[str, Callable[[ga.Result], Any]] = {
     "densify": lambda result: ga.densify(result, 0.0008, progress=False),
-    "refine": lambda result: ga.refine(result, progress=False),
-    "refine in F": lambda result: ga.refine(result, all_motions=True, progress=False),
+    "refine": lambda result: ga.refine(slowed(result), progress=False),
+    "refine in F": lambda result: ga.refine(slowed(result), all_motions=True, progress=False),
     "find_grasps": lambda result: ga.find_grasps(result.problem, count=10**6, progress=False),
     "find_components": lambda result: ga.find_components(result.problem, radius=0.1, covered=10**6, progress=False),
     "round cones": lambda result: ga.quality.ferrari_canny_epsilon(many(result), edges=None),

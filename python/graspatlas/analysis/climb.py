@@ -10,6 +10,7 @@ grasp". This module lets you test that on your own result::
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -29,6 +30,7 @@ from graspatlas.analysis.unbounded import (
 from graspatlas.errors import GraspAtlasError
 from graspatlas.result.grasp_atlas import GraspAtlas, check_is_result
 from graspatlas.support.arrays import Array
+from graspatlas.support.deadlines import deadline_after
 from graspatlas.support.validation import number_array, positive, shown, whole
 
 __all__ = ["MAX_STEPS", "Climb", "climb", "climbs_from", "climbs_of"]
@@ -148,12 +150,15 @@ def climbs_from(
     Returns:
         A climb for each; one that never met the requirements stays where it started.
     """
+    deadline = deadline_after(max_seconds)
     ends = objective.climbs(X, max_steps, max_seconds)
-    return climbs_of(objective, X, charts, ends)
+    return climbs_of(objective, X, charts, ends, deadline)
 
 
-def climbs_of(objective: Objective, X: Array, charts: Sequence[int], ends: Ends) -> list[Climb]:
-    """Ends of climbs in the core as climbs, whether the index has a maximum there, checked."""
+def climbs_of(
+    objective: Objective, X: Array, charts: Sequence[int], ends: Ends, deadline: float = float("inf")
+) -> list[Climb]:
+    """Ends of climbs in the core as climbs; whether the index has a maximum there is looked at while there is time."""
     values = objective.values(X)
     found = []
     for i, chart in enumerate(charts):
@@ -171,7 +176,7 @@ def climbs_of(objective: Objective, X: Array, charts: Sequence[int], ends: Ends)
                 kkt=float(ends.kkt[i]),
                 stalled=status == "stalled",
             )
-        found.append(_judged(objective, end))
+        found.append(_judged(objective, end) if time.perf_counter() < deadline else end)
     return found
 
 

@@ -83,6 +83,7 @@ def refine(
                 new = climbs_from(free, X, [-1] * len(X), max_steps, _time_left(deadline))
                 ends[first : first + BATCH] = new
                 bar.update(len(X))
+        complete = time.perf_counter() < deadline
     except KeyboardInterrupt:
         complete = False
         if not ends:

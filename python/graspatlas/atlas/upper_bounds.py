@@ -137,7 +137,14 @@ def _slopes(ways: _Ways, differences: Array) -> tuple[Array, BoolArray]:
 
 
 def _largest_rise(atlas: Atlas, g: Array, h: Array, low: Array, high: Array) -> Array:
-    """Largest rise over each chart's polytope [n], for slopes g and their tilts h [n, k] and curvatures [n]."""
+    """Largest rise over each chart [n], for slopes g and their tilts h [n, k] and curvatures [n].
+
+    Over its polytope, or over the ball of its radius where the atlas does not hold all vertices of that.
+    """
+    if not atlas.lists_all_vertices:
+        steepest = np.linalg.norm(g, axis=1) + np.maximum(abs(low), abs(high)) * np.linalg.norm(h, axis=1)
+        bend = 0.5 * np.maximum(0.0, high + (high - low)) * atlas.radius**2
+        return np.asarray(atlas.radius * steepest + bend)
     chart = np.repeat(np.arange(atlas.n_charts), np.diff(atlas.vertex_start))
     v = atlas.vertices
     along, tilt = np.einsum("vk,vk->v", v, g[chart]), np.einsum("vk,vk->v", v, h[chart])

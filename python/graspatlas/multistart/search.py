@@ -9,7 +9,6 @@ from contextlib import closing
 from functools import partial
 
 import numpy as np
-from tqdm import tqdm
 
 from graspatlas.analysis.objective import Objective
 from graspatlas.analysis.unbounded import Around, levels_around, never_levels_off, rises_towards_one_point
@@ -22,7 +21,7 @@ from graspatlas.result.refinement import Refinement, SearchEnd, SearchReport
 from graspatlas.support.arrays import Array
 from graspatlas.support.deadlines import deadline_after
 from graspatlas.support.interrupts import held, stopping
-from graspatlas.support.progress import progress_bar
+from graspatlas.support.progress import ProgressBar, progress_bar
 
 __all__ = ["MOST_ROUNDS", "SHARE", "Search", "Source", "nothing_meets", "one_by_one"]
 
@@ -109,7 +108,7 @@ class Search:
         with held():
             return self._refinement(status, time.perf_counter() - start)
 
-    def _follow(self, rounds: Iterator[Round], deadline: float, bar: tqdm[None]) -> SearchEnd:
+    def _follow(self, rounds: Iterator[Round], deadline: float, bar: ProgressBar) -> SearchEnd:
         """Count rounds until the search ends; why it does."""
         while True:
             ended = self._ended(deadline)
