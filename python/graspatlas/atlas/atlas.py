@@ -39,6 +39,9 @@ LARGEST = 1e100
 #: Facets of a polygon shorter than this share of the radius are left out of the surface's triangulation.
 SHORT_FACET = 0.05
 
+#: Vertices of a polytope nearer to each other than this share of the radius count as one for its volume.
+_GRAIN = 1e-7
+
 
 @dataclass(frozen=True, eq=False)
 class Atlas(Light):
@@ -242,7 +245,10 @@ class Atlas(Light):
 
         if self.dimension == 1:
             return np.array([np.ptp(self.polytope(i)) for i in range(self.n_charts)])
-        return np.array([ConvexHull(self.polytope(i)).volume for i in range(self.n_charts)])
+        # Corners where more than k facets meet are several points next to each other, which Qhull cannot tell apart.
+        grain = _GRAIN * self.radius
+        corners = (np.unique(np.round(self.polytope(i) / grain), axis=0) * grain for i in range(self.n_charts))
+        return np.array([ConvexHull(points).volume for points in corners])
 
     @cached_property
     def _vertex_counts(self) -> IntArray:
