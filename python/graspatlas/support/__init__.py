@@ -1,1 +1,1 @@
-"""What every package stands on: files, checked arguments, interrupts, text for a terminal."""
+"""What every package stands on: checked arguments, interrupts, limits of time, text for a terminal."""

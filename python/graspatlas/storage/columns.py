@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from graspatlas.errors import GraspAtlasError
+from graspatlas.storage.files import replaced, write_csv
 from graspatlas.support.arrays import AnyArray, Array
-from graspatlas.support.files import replaced, write_csv
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -12,7 +12,7 @@ import pytest
 
 import graspatlas as ga
 from graspatlas.cli import main
-from graspatlas.support.files import replaced
+from graspatlas.storage.files import replaced
 from graspatlas.viewer import export_html, save_picture
 
 #: Modules of the standard library, and others, that the viewer or a worker imports.

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import graspatlas as ga
-from graspatlas.support.archives import DamagedArchive, read_arrays
+from graspatlas.storage.archives import DamagedArchive, read_arrays
 
 #: Modules of the standard library, and others, that the viewer or a worker imports.
 PLANTED = ("html", "secrets", "pickle", "socket", "multiprocessing", "tornado", "zmq", "numpy", "base64", "selectors")
