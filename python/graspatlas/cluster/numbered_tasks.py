@@ -98,7 +98,8 @@ class NumberedTasks(Generic[T]):
 
         seconds = min(ASK_SECONDS, max(deadline - time.perf_counter(), 0.0))
         try:
-            dask.wait(running, timeout=seconds, return_when="FIRST_COMPLETED")
+            with self.client.as_current():  # of several clients, it would ask another for what this one submitted
+                dask.wait(running, timeout=seconds, return_when="FIRST_COMPLETED")
         except dask.TimeoutError:
             pass
         except dask.CancelledError:
