@@ -13,7 +13,7 @@ int main() {
       {"atlases", strain::atlases},     {"misuse", strain::misuse},         {"users", strain::users},
       {"pictures", strain::pictures},
 #ifdef GRASPATLAS_WITH_GRASPS
-      {"grasps", strain::grasps},       {"collisions", strain::collisions},
+      {"grasps", strain::grasps},       {"collisions", strain::collisions}, {"climbs", strain::climbs},
 #endif
   };
   for (const auto& [name, run] : parts) {

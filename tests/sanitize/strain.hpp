@@ -63,6 +63,7 @@ class Random {
 };
 
 void atlases();
+void climbs();
 void collisions();
 void fronts();
 void grasps();
