@@ -197,6 +197,8 @@ def test_arguments_that_make_no_sense():
     for name, value in wrong.items():
         with pytest.raises(ga.GraspAtlasError, match=name):
             quality.holding_force(grasps, **{name: value})
+    with pytest.raises(ga.GraspAtlasError, match="gap must be at least 1e-05"):
+        quality.holding_force(grasps, gap=1e-7)
     for efforts, said in (({}, "names no joint"), ({"z9": 1.0}, "z9"), ({"a0": 0.0}, "a0"), ("strong", "efforts")):
         with pytest.raises(ga.GraspAtlasError, match=said):
             quality.holding_force(grasps, efforts=efforts)

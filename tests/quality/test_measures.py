@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import graspatlas as ga
 from graspatlas import _core, quality
+from graspatlas.collision.checker import CollisionChecker, collision_checker
 from graspatlas.quality.evaluation import evaluate
 from graspatlas.quality.holding_force import GAP
 from graspatlas.quality.measures import index_measure
@@ -29,6 +30,9 @@ EXACT = [
     ("planar_hand", "soft_finger_epsilon"),
     ("allegro_box_4", "joint_centrality"),
     ("schunk_can", "joint_centrality"),
+    ("schunk_can", "manipulability_volume"),
+    ("allegro_sphere_3", "inverse_condition_number"),
+    ("planar_hand", "smallest_semi_axis"),
 ]
 HELD = [(name, "holding_force") for name in ("allegro_box_3", "allegro_cylinder_4", "schunk_can", "planar_hand")]
 
@@ -117,6 +121,66 @@ def test_a_requirement_has_a_row_for_each_direction(name: str, options: dict[str
         # Rows of other directions than the least move on their own.
         slopes = differences(name, row, partial(matched, name, measure, row["values"]))
         np.testing.assert_allclose(row["slopes"], slopes.T, atol=1e-6 * max(np.abs(slopes).max(), 1.0))
+
+
+@pytest.mark.parametrize("name", ["schunk_can", "planar_hand", "gripper_skittle"])
+@pytest.mark.parametrize("torsional", [0.0, 0.005])
+def test_closure_has_the_slopes_of_its_slack(name: str, torsional: float) -> None:
+    grasps = found(name)
+    (measure,) = ga.ForceClosure(0.5, 0.02, torsional).measures(grasps.problem, grasps.system)
+    slacks = quality.force_closure_slack(grasps, 0.5, torsional)
+    assert (slacks > -1.0).any() or torsional == 0.0
+    for x, slack in list(zip(grasps.x, slacks, strict=True))[:25]:
+        row = measured(name, measure, x)
+        expected = slack if slack >= -1.0 else -1.0 - np.log(min(-slack, 1e6))
+        np.testing.assert_allclose(row["values"], expected - 0.02 - INSIDE, atol=1e-8)
+        slopes = differences(name, row, lambda X: np.array([measured(name, measure, x)["values"][0] for x in X]))
+        np.testing.assert_allclose(row["slopes"][0], slopes, atol=1e-4 * max(np.abs(slopes).max(), 1.0))
+
+
+@pytest.mark.parametrize("name", ["schunk_can", "allegro_sphere_3"])
+def test_distances_have_the_slopes_of_nearest_points(name: str) -> None:
+    """Where the nearest points jump from one edge to another there is none; that is seldom."""
+    grasps = found(name)
+    required = ga.CollisionFree(5e-5)
+    (measure,) = required.measures(grasps.problem, grasps.system)
+    checker = collision_checker(grasps.problem, required.touch_depth, required.clearance)
+    right: list[bool] = []
+    for x in grasps.x:
+        row = measured(name, measure, x)
+        pairs = np.asarray(row["ids"], np.int32)
+        apart = checker.nearest(row["x"][None], pairs).distances[0] > 1e-4
+        clearances = checker.clearances(row["x"][None], pairs)[0]
+        assert (row["values"] * grasps.problem.length_scale <= clearances).all()
+        slopes = differences_of_clearances(name, row, checker, pairs)
+        right += (np.abs(row["slopes"] - slopes) < 1e-3 * np.maximum(np.abs(slopes), 1.0))[apart].all(axis=1).tolist()
+    assert len(right) > 50
+    assert np.mean(right) > 0.95
+
+
+def differences_of_clearances(
+    name: str, row: dict[str, Array], checker: CollisionChecker, pairs: NDArray[np.int32], step: float = 1e-4
+) -> Array:
+    """Slopes of the distances of pairs [p, k], by steps that are long beside the error of distances."""
+    system, units = found(name).system, np.eye(len(row["Phi"]))
+    X = [_core.project(system, row["x"], row["Phi"], s * step * u) for u in units for s in (1.0, -1.0)]
+    clearances = checker.clearances(np.array(X), pairs) / found(name).problem.length_scale
+    return np.asarray((clearances[::2] - clearances[1::2]).T / (2.0 * step))
+
+
+@pytest.mark.parametrize("name", ["schunk_can", "allegro_sphere_3"])
+def test_joint_margins_have_a_row_for_each_limit(name: str) -> None:
+    grasps = found(name)
+    (measure,) = ga.JointMargin(0.1).measures(grasps.problem, grasps.system)
+    lower, upper = grasps.problem.hand.joint_limits
+    for x in grasps.x[:5]:
+        row = measured(name, measure, x)
+        q = row["x"][: len(lower)]
+        left = np.concatenate([q - lower, upper - q])
+        assert row["values"].min() == pytest.approx(left.min() - 0.1, abs=1e-7)
+        assert len(row["values"]) == np.isfinite(left).sum()
+        slopes = differences(name, row, lambda X: np.array([measured(name, measure, x)["values"] for x in X]))
+        np.testing.assert_allclose(row["slopes"], slopes.T, atol=1e-7)
 
 
 def matched(name: str, measure: _core.Measure, before: Array, X: Array) -> Array:

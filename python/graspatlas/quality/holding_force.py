@@ -165,7 +165,7 @@ def holding_limits(
         efforts=_efforts(hand, efforts) if limited else np.zeros(0),
         center_of_mass=problem.object.center_of_mass,
         torque_length=number(torque_length, "torque_length"),
-        gap=positive(gap, "gap", 0.5),
+        gap=_gap(gap),
     )
 
 
@@ -188,3 +188,14 @@ def _efforts(hand: Hand, efforts: Efforts) -> Array:
     if not efforts:
         raise GraspAtlasError("efforts names no joint; leave it out, or state some")
     return np.array([positive(efforts[n], f"effort of joint '{n}'") if n in efforts else np.inf for n in actuated])
+
+
+def _gap(value: float) -> float:
+    """The relative difference that is asked for; below :data:`GAP` rounding makes values too small.
+
+    Raises:
+        GraspAtlasError: If it is out of its range.
+    """
+    if not positive(value, "gap", 0.5) >= GAP:
+        raise GraspAtlasError(f"gap must be at least {GAP:g}, got {value:g}: leave it out for the finest that there is")
+    return float(value)
