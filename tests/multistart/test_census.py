@@ -22,9 +22,9 @@ def round_of(values: list[float], places: list[float], *, converged: bool = True
         kkt=np.full(n, 1e-8),
         met=met,
         converged=met & converged,
+        stalled=met & (not converged),
         missed=np.where(met, 0.0, 0.3),
         tries=n,
-        drawn=n,
         seconds=0.0,
     )
 

@@ -14,8 +14,8 @@ from graspatlas import _core
 from graspatlas.atlas.status import Audit, Closed, Status
 from graspatlas.atlas.topology import euler_characteristic, facet_ring
 from graspatlas.errors import GraspAtlasError
+from graspatlas.storage.columns import joined, to_frame
 from graspatlas.support.arrays import AnyArray, Array, BoolArray, Int32Array, IntArray
-from graspatlas.support.columns import joined, to_frame
 from graspatlas.support.pickling import Light
 from graspatlas.support.validation import number_array, read_only
 from graspatlas.systems.projection import checked_point

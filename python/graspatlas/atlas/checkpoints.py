@@ -12,9 +12,9 @@ import numpy as np
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
-from graspatlas.support.archives import DamagedArchive, read_arrays
+from graspatlas.storage.files import stated_path
+from graspatlas.storage.run_files import damaged, read_run_file, write_run_file
 from graspatlas.support.arrays import AnyArray, Array
-from graspatlas.support.files import opened, replaced, stated_path
 from graspatlas.systems.system import AnySystem
 
 __all__ = ["CheckpointFolder", "run_digest"]
@@ -89,23 +89,9 @@ class CheckpointFolder:
         return whole.ravel()
 
     def _read(self, path: Path) -> dict[str, AnyArray]:
-        try:
-            with opened(path, "checkpoint") as stream:
-                part = read_arrays(stream)
-            digest = str(part.pop("digest"))
-        except OSError as error:
-            raise GraspAtlasError(f"cannot read checkpoint '{path}': {error.strerror or error}") from None
-        except (DamagedArchive, KeyError) as error:
-            raise GraspAtlasError(
-                f"'{path}' is damaged or no checkpoint ({error}); delete '{self.folder}' to begin anew"
-            ) from None
-        if digest != self.digest:
-            raise GraspAtlasError(
-                f"'{self.folder}' holds the checkpoint of another problem, of other options or of another version: "
-                "finish that run, delete the folder, or choose another one"
-            )
+        part = read_run_file(path, self.digest)
         if set(part) != set(_KINDS) or any(array.dtype.kind not in _KINDS[name] for name, array in part.items()):
-            raise GraspAtlasError(f"'{path}' is damaged or no checkpoint; delete '{self.folder}' to begin anew")
+            raise damaged(path)
         return part
 
     def write(self, builder: _core.AtlasBuilder) -> None:
@@ -114,13 +100,9 @@ class CheckpointFolder:
         Raises:
             GraspAtlasError: If the file cannot be written.
         """
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise GraspAtlasError(f"cannot make folder '{self.folder}': {error.strerror or error}") from None
-        with replaced(self.folder / f"{self._n_files:06}.npz") as stream:
-            part: dict[str, Any] = dict(builder.save(self._n_charts))
-            np.savez(stream, digest=self.digest, first=self._n_charts, **part)
+        part: dict[str, Any] = dict(builder.save(self._n_charts))
+        path = self.folder / f"{self._n_files:06}.npz"
+        write_run_file(path, self.digest, {"first": self._n_charts, **part})
         self._n_files += 1
         self._n_charts = builder.n_settled
 

@@ -7,11 +7,12 @@ from enum import Enum
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
+from graspatlas.support.words import Word
 
 __all__ = ["Audit", "Closed", "Status"]
 
 
-class Status(str, Enum):
+class Status(Word):
     """How the construction of an atlas ended; all but the first are cut short."""
 
     COMPLETE = "complete"
@@ -20,9 +21,6 @@ class Status(str, Enum):
     MEMORY_LIMIT = "cut short: limit of memory"
     INTERRUPTED = "cut short: interrupted"
     BLOCKED = "cut short: steps from some charts failed"
-
-    def __str__(self) -> str:
-        return self.value
 
 
 class Closed(int, Enum):

@@ -18,7 +18,7 @@ from graspatlas.paths.shortest_path import shortest_path
 from graspatlas.paths.time_parametrization import speed_limits
 from graspatlas.quality.batched import quality_name
 from graspatlas.result.result import Result, load_result
-from graspatlas.support.files import replaced, writable_folder
+from graspatlas.storage.files import replaced, writable_folder
 from graspatlas.support.terminal import say
 
 __all__ = ["add_commands"]

@@ -21,7 +21,7 @@ from graspatlas.problems import load_problem
 from graspatlas.quality.evaluation import INDICES
 from graspatlas.requirements.named import parse_requirement
 from graspatlas.result.refinement import SearchEnd
-from graspatlas.support.files import replaced, writable_folder
+from graspatlas.storage.files import replaced, writable_folder
 from graspatlas.support.terminal import say
 
 __all__ = ["add_commands"]

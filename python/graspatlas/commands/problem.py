@@ -11,7 +11,7 @@ from graspatlas.commands.arguments import Subcommands, path_word
 from graspatlas.commands.diagnosis import PROBLEM, Finding, diagnose, report
 from graspatlas.errors import GraspAtlasError
 from graspatlas.problems import load_problem
-from graspatlas.support.files import replaced
+from graspatlas.storage.files import replaced
 from graspatlas.support.terminal import say
 
 __all__ = ["add_commands"]

@@ -11,7 +11,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.execution.pregrasp import DISTANCE
 from graspatlas.formats.export import FORMATS, export_grasps
 from graspatlas.result.result import load_result
-from graspatlas.support.columns import FRAME_ENDINGS, save_frame
+from graspatlas.storage.columns import FRAME_ENDINGS, save_frame
 from graspatlas.support.terminal import say
 from graspatlas.support.validation import PlainTable
 

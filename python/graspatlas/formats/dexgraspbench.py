@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from graspatlas.formats.hand_over import HandOver
+from graspatlas.storage.files import replaced, writable_folder
 from graspatlas.support.arrays import Array
-from graspatlas.support.files import replaced, writable_folder
 
 __all__ = ["write_dexgraspbench"]
 

@@ -8,8 +8,8 @@ import yaml
 
 from graspatlas.formats.hand_over import HandOver
 from graspatlas.hand.urdf import root_link
+from graspatlas.storage.files import replaced
 from graspatlas.support.arrays import Array
-from graspatlas.support.files import replaced
 from graspatlas.support.validation import PlainTable
 
 __all__ = ["write_isaac_grasp"]

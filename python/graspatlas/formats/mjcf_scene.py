@@ -11,7 +11,7 @@ from graspatlas.formats.hand_over import HandOver
 from graspatlas.simulation.mjcf import child, text
 from graspatlas.simulation.protocols import PROTOCOLS
 from graspatlas.simulation.scene import Scene
-from graspatlas.support.files import replaced
+from graspatlas.storage.files import replaced
 
 __all__ = ["write_mjcf"]
 

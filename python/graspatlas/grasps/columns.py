@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from graspatlas.grasps.grasps import Grasps
+from graspatlas.storage.columns import joined, pose_columns
 from graspatlas.support.arrays import AnyArray, Array
-from graspatlas.support.columns import joined, pose_columns
 
 __all__ = ["contact_columns", "grasp_columns", "parameter_columns"]
 

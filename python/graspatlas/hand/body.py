@@ -12,8 +12,8 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.robot_files import find_file, package_folders
 from graspatlas.hand.urdf import box_urdf, center_of_mass, cylinder_urdf, sphere_urdf
 from graspatlas.hand.urdf_checks import check_urdf
+from graspatlas.storage.files import read_text
 from graspatlas.support.arrays import Array
-from graspatlas.support.files import read_text
 from graspatlas.support.pickling import Light
 from graspatlas.support.validation import PlainTable, StatedTable, checked_table, read_only
 

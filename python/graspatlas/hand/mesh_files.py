@@ -11,8 +11,8 @@ import numpy as np
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.robot_files import PACKAGE
 from graspatlas.hand.urdf_checks import LARGEST
+from graspatlas.storage.files import is_file, read_text
 from graspatlas.support.arrays import Array
-from graspatlas.support.files import is_file, read_text
 
 if TYPE_CHECKING:
     from graspatlas.hand.body import Body

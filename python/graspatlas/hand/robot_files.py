@@ -10,7 +10,7 @@ from importlib import resources
 from pathlib import Path
 
 from graspatlas.errors import GraspAtlasError, unknown_name
-from graspatlas.support.files import is_file
+from graspatlas.storage.files import is_file
 
 __all__ = ["described_robot", "example_robot", "find_file", "package_folders", "robots_folder"]
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,9 +15,11 @@ __all__ = ["Census", "FoundPeak"]
 #: Ends of climbs are one maximum where their indices differ by less than this share, or they are nearer to each other
 #: than this [units of the tangent space].
 SAME_INDEX, SAME_PLACE = 1e-4, 0.05
+#: Of these one is as high as another where they differ by less than this share.
+AS_HIGH = 1e-5
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class FoundPeak:
     """A place at which climbs ended.
 
@@ -27,6 +29,7 @@ class FoundPeak:
         value: The index there.
         kkt: Residual of the conditions of optimality there.
         converged: Whether it is a local maximum, by that.
+        stalled: Whether it is none, but no smaller step gained anything.
         hits: Climbs that ended there.
     """
 
@@ -35,14 +38,19 @@ class FoundPeak:
     value: float
     kkt: float
     converged: bool
-    hits: int = 0
+    stalled: bool
+    hits: int = 1
 
-    def take(self, x: Array, place: Array, value: float, kkt: float, converged: bool) -> None:
-        """Count a climb that ended here."""
-        self.hits += 1
-        higher = value > self.value + SAME_INDEX * abs(self.value)
-        if higher or (converged, value) > (self.converged, self.value):
-            self.x, self.place, self.value, self.kkt, self.converged = x, place, value, kkt, converged
+    def is_where(self, other: FoundPeak) -> bool:
+        """Whether two ends are at one maximum."""
+        near = abs(self.value - other.value) <= SAME_INDEX * max(abs(other.value), 1e-12)
+        return near or bool(np.linalg.norm(self.place - other.place) <= SAME_PLACE)
+
+    def stands_for(self, other: FoundPeak) -> bool:
+        """Whether this end tells more than another of the same maximum: it is higher, or as high and has converged."""
+        if abs(self.value - other.value) > AS_HIGH * abs(other.value):
+            return self.value > other.value
+        return (self.converged, self.value) > (other.converged, other.value)
 
 
 class Census:
@@ -74,8 +82,8 @@ class Census:
         self.met += int(new.met.sum())
         if new.kind is not RoundKind.STATED:
             self._counted += int(new.met.sum())
-        for i in np.flatnonzero(new.met).tolist():
-            self._take(new.x[i], float(new.value[i]), float(new.kkt[i]), bool(new.converged[i]))
+        for end in _ends(new, self._embed):
+            self._take(end)
         if self.met:
             self.least_missed = None
         elif len(new.x):
@@ -83,14 +91,21 @@ class Census:
             if self.least_missed is None or new.missed[i] < self.least_missed[0]:
                 self.least_missed = float(new.missed[i]), new.x[i]
 
-    def _take(self, x: Array, value: float, kkt: float, converged: bool) -> None:
-        place = np.asarray(self._embed(x))
-        for peak in self.peaks:
-            near = abs(peak.value - value) <= SAME_INDEX * max(abs(value), 1e-12)
-            if near or np.linalg.norm(peak.place - place) <= SAME_PLACE:
-                peak.take(x, place, value, kkt, converged)
+    def _take(self, end: FoundPeak) -> None:
+        for i, peak in enumerate(self.peaks):
+            if peak.is_where(end):
+                hits = peak.hits + 1
+                self.peaks[i] = replace(end if end.stands_for(peak) else peak, hits=hits)
                 return
-        self.peaks.append(FoundPeak(x, place, value, kkt, converged, hits=1))
+        self.peaks.append(end)
+
+    def improve(self, new: Round) -> None:
+        """Let ends of more climbs from around the best stand for it, without counting them."""
+        best = self.best
+        for end in _ends(new, self._embed):
+            if best is not None and best.is_where(end) and end.stands_for(best):
+                improved = replace(end, hits=best.hits)
+                self.peaks[self.peaks.index(best)] = best = improved
 
     @property
     def best(self) -> FoundPeak | None:
@@ -109,3 +124,16 @@ class Census:
         """
         w, n = len(self.peaks), self._counted
         return min(1.0, w * (w + 1) / (n * (n - 1))) if n > 1 else 1.0
+
+
+def _ends(new: Round, embed: Callable[[Array], Array]) -> Iterator[FoundPeak]:
+    """The ends of a round that meet the requirements."""
+    for i in np.flatnonzero(new.met).tolist():
+        yield FoundPeak(
+            x=new.x[i],
+            place=np.asarray(embed(new.x[i])),
+            value=float(new.value[i]),
+            kkt=float(new.kkt[i]),
+            converged=bool(new.converged[i]),
+            stalled=bool(new.stalled[i]),
+        )

@@ -9,20 +9,25 @@ from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 
-import numpy as np
-
-from graspatlas.errors import GraspAtlasError
 from graspatlas.multistart.rounds import Plan, Round, RoundKind
+from graspatlas.problem.requirement import StatedRequirement
 from graspatlas.quality.batched import quality_name
-from graspatlas.requirements.base import requirement_name
-from graspatlas.support.archives import DamagedArchive, read_arrays
-from graspatlas.support.files import opened, replaced, stated_path
+from graspatlas.requirements.base import RequirementLike, requirement_name
+from graspatlas.storage.files import stated_path
+from graspatlas.storage.run_files import damaged, read_run_file, write_run_file
 
 __all__ = ["RoundFolder"]
 
 #: Changes when a round of an older version would not be the same.
 VERSION = 1
-_ARRAYS = {"x": "f", "value": "f", "kkt": "f", "met": "b", "converged": "b", "missed": "f"}
+#: Arrays of a round with a row or number for each climb, and the kinds of all that a file holds.
+_ARRAYS = ("x", "value", "kkt", "missed", "met", "converged", "stalled")
+_KINDS = {
+    **dict.fromkeys(("x", "value", "kkt", "missed", "seconds"), "f"),
+    **dict.fromkeys(("met", "converged", "stalled"), "b"),
+    **dict.fromkeys(("number", "tries"), "i"),
+    "kind": "U",
+}
 
 
 class RoundFolder:
@@ -35,18 +40,14 @@ class RoundFolder:
 
     def __init__(self, folder: str | os.PathLike[str], plan: Plan) -> None:
         self.folder = stated_path(folder, "keep a checkpoint at")
-        stated = [
-            VERSION,
-            plan.problem.to_dict(),
-            quality_name(plan.quality),
-            [requirement_name(requirement) for requirement in plan.requirements],
-            plan.dimension,
-            plan.radius,
-            plan.epsilon,
-            plan.seed,
-            plan.max_steps,
-        ]
-        self.digest = hashlib.sha256(json.dumps(stated, sort_keys=True, default=str).encode()).hexdigest()
+        stated = {field.name: getattr(plan, field.name) for field in fields(plan) if field.name != "threads"}
+        stated["problem"] = plan.problem.to_dict()
+        stated["quality"] = quality_name(plan.quality)
+        stated["requirements"] = [_stated(requirement) for requirement in plan.requirements]
+        # Functions that share a name differ in what they say of a grasp.
+        x1 = plan.problem.x1_array[None]
+        said = [float(plan.objective.values(x1)[0]), bool(plan.objective.meets(x1)[0])]
+        self.digest = hashlib.sha256(json.dumps([VERSION, stated, said], sort_keys=True).encode()).hexdigest()
 
     def load(self) -> Iterator[Round]:
         """The rounds that are kept, in their order, up to the first that is missing.
@@ -65,13 +66,8 @@ class RoundFolder:
         Raises:
             GraspAtlasError: If the file cannot be written.
         """
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise GraspAtlasError(f"cannot make folder '{self.folder}': {error.strerror or error}") from None
         values = {field.name: getattr(new, field.name) for field in fields(new)}
-        with replaced(self._path(new.number)) as stream:
-            np.savez(stream, digest=self.digest, **{**values, "kind": str(new.kind)})
+        write_run_file(self._path(new.number), self.digest, {**values, "kind": str(new.kind)})
 
     @staticmethod
     def remove(folder: Path) -> None:
@@ -86,31 +82,20 @@ class RoundFolder:
 
     def _read(self, number: int) -> Round:
         path = self._path(number)
-        try:
-            with opened(path, "checkpoint") as stream:
-                part = read_arrays(stream)
-            digest = str(part.pop("digest"))
-            if digest != self.digest:
-                raise GraspAtlasError(
-                    f"'{self.folder}' holds the checkpoint of another problem, of other options or of another version: "
-                    "finish that search, delete the folder, or choose another one"
-                )
-            n = len(part["x"])
-            if any(part[name].dtype.kind != kind or len(part[name]) != n for name, kind in _ARRAYS.items()):
-                raise DamagedArchive("its arrays do not fit together")
-            return Round(
-                number=number,
-                kind=RoundKind(str(part["kind"])),
-                tries=int(part["tries"]),
-                drawn=int(part["drawn"]),
-                seconds=float(part["seconds"]),
-                **{name: part[name] for name in _ARRAYS},
-            )
-        except OSError as error:
-            raise GraspAtlasError(f"cannot read checkpoint '{path}': {error.strerror or error}") from None
-        except (DamagedArchive, KeyError, ValueError, TypeError) as error:
-            if isinstance(error, GraspAtlasError):
-                raise
-            raise GraspAtlasError(
-                f"'{path}' is damaged or no checkpoint ({error}); delete '{self.folder}' to begin anew"
-            ) from None
+        part = read_run_file(path, self.digest)
+        n = len(part.get("x", ()))
+        whole = all(name in part and part[name].dtype.kind == kind for name, kind in _KINDS.items())
+        if not whole or str(part["kind"]) not in list(RoundKind) or any(len(part[name]) != n for name in _ARRAYS):
+            raise damaged(path)
+        return Round(
+            number=number,
+            kind=RoundKind(str(part["kind"])),
+            tries=int(part["tries"]),
+            seconds=float(part["seconds"]),
+            **{name: part[name] for name in _ARRAYS},
+        )
+
+
+def _stated(requirement: RequirementLike) -> object:
+    """A requirement as plain data; of a function its name."""
+    return requirement.to_dict() if isinstance(requirement, StatedRequirement) else requirement_name(requirement)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from enum import Enum
 from functools import cached_property
 
 import numpy as np
@@ -25,9 +24,11 @@ from graspatlas.quality.batched import Quality
 from graspatlas.requirements.base import RequirementLike
 from graspatlas.search.grasp_search import GraspSearch
 from graspatlas.support.arrays import Array, BoolArray
+from graspatlas.support.deadlines import deadline_after, seconds_until
 from graspatlas.support.pickling import Light
+from graspatlas.support.words import Word
 
-__all__ = ["FIRST_STEP", "Plan", "Round", "RoundKind", "climbed", "run_round"]
+__all__ = ["FIRST_STEP", "Plan", "Round", "RoundKind", "Starts", "climbed", "run_round"]
 
 #: Tries at random grasps in a round.
 TRIES = 400
@@ -39,19 +40,18 @@ APART = 0.2
 SLICE_CHARTS = 600
 #: Longest time that it may take, far more than it needs [s].
 SLICE_SECONDS = 10.0
+#: Time that climbs are given where none is left [s].
+SHORTEST = 1e-3
 #: Largest entry of the first step of a climb [units of the tangent space].
 FIRST_STEP = 0.1
 
 
-class RoundKind(str, Enum):
+class RoundKind(Word):
     """Where the climbs of a round start."""
 
     STATED = "stated"
     RANDOM = "random"
     SLICE = "slice"
-
-    def __str__(self) -> str:
-        return self.value
 
 
 @dataclass(frozen=True)
@@ -99,9 +99,9 @@ class Round:
         kkt: Largest residual of the conditions of Karush, Kuhn and Tucker [n].
         met: Whether the end is a grasp that meets bounds and requirements [n].
         converged: Whether it is a local maximum, by ``kkt`` [n].
+        stalled: Whether it is none, but no smaller step gained anything [n].
         missed: By how much the requirement that is missed most is, where ``met`` is False [n].
         tries: Random starts that were tried at grasps.
-        drawn: Grasps among which the starts were chosen.
         seconds: Time that it took.
     """
 
@@ -112,10 +112,27 @@ class Round:
     kkt: Array
     met: BoolArray
     converged: BoolArray
+    stalled: BoolArray
     missed: Array
     tries: int
-    drawn: int
     seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Starts:
+    """Where the climbs of a round start.
+
+    Attributes:
+        number: Of the round.
+        kind: Where they come from.
+        x: The grasps [n, configuration_size]; they may miss requirements.
+        tries: Random starts that were tried at grasps.
+    """
+
+    number: int
+    kind: RoundKind
+    x: Array
+    tries: int = 0
 
 
 def run_round(plan: Plan, number: int, max_seconds: float | None = None) -> Round:
@@ -126,51 +143,42 @@ def run_round(plan: Plan, number: int, max_seconds: float | None = None) -> Roun
         number: Of the round, from 1 on.
         max_seconds: Time after which its climbs are given up; none by default.
     """
-    start = time.perf_counter()
-    objective = plan.objective
+    deadline = deadline_after(max_seconds)
     search = GraspSearch(plan.problem, plan.problem.largest_dimension, [plan.seed, number])
-    X = search.attempts(TRIES)
-    kind = RoundKind.RANDOM
+    kind, X = RoundKind.RANDOM, search.attempts(TRIES)
     if number % 2 == 0 and len(X) and plan.problem.frozen_motions(plan.dimension) > 0:
-        kind, X = RoundKind.SLICE, _slice(plan, objective, X)
-    return climbed(plan, objective, number, kind, _chosen(objective, X), search.tries, len(X), start, max_seconds)
+        kind, X = RoundKind.SLICE, _slice(plan, X)
+    return climbed(plan, Starts(number, kind, _chosen(plan.objective, X), search.tries), deadline)
 
 
-def climbed(
-    plan: Plan,
-    objective: Objective,
-    number: int,
-    kind: RoundKind,
-    X: Array,
-    tries: int,
-    drawn: int,
-    start: float,
-    max_seconds: float | None,
-) -> Round:
-    """The round whose climbs start at X [n, configuration_size]."""
-    if not len(X):
-        none = np.zeros(0)
-        flags = np.zeros(0, bool)
-        return Round(number, kind, X, none, none, flags, flags, none, tries, drawn, time.perf_counter() - start)
-    left = None if max_seconds is None else max(max_seconds - (time.perf_counter() - start), 1e-3)
-    ends = objective.climbs(X, plan.max_steps, left)
-    met = np.array([status != "not met" for status in ends.status]) & np.isfinite(ends.value)
+def climbed(plan: Plan, starts: Starts, deadline: float) -> Round:
+    """The round whose climbs start at these grasps.
+
+    Args:
+        plan: What is maximised.
+        starts: The grasps.
+        deadline: Reading of ``time.perf_counter`` after which climbs are given up [s].
+    """
+    begun, objective = time.perf_counter(), plan.objective
+    ends = objective.climbs(starts.x, plan.max_steps, seconds_until(deadline, SHORTEST))
+    status = np.array(ends.status, str)
+    met = (status != "not met") & np.isfinite(ends.value)
     # Asked again, by the code that says what grasps are accepted.
     met[met] = objective.meets(ends.x[met])
-    value = np.full(len(X), -np.inf)
+    value = np.full(len(met), -np.inf)
     value[met] = objective.values(ends.x[met])
     return Round(
-        number=number,
-        kind=kind,
+        number=starts.number,
+        kind=starts.kind,
         x=ends.x,
         value=value,
         kkt=ends.kkt,
         met=met,
-        converged=met & np.array([status == "converged" for status in ends.status]),
+        converged=met & (status == "converged"),
+        stalled=met & (status == "stalled"),
         missed=np.where(met, 0.0, ends.missed),
-        tries=tries,
-        drawn=drawn,
-        seconds=time.perf_counter() - start,
+        tries=starts.tries,
+        seconds=time.perf_counter() - begun,
     )
 
 
@@ -192,13 +200,13 @@ def _chosen(objective: Objective, X: Array) -> Array:
     return X[chosen]
 
 
-def _slice(plan: Plan, objective: Objective, X: Array) -> Array:
+def _slice(plan: Plan, X: Array) -> Array:
     """Charts of an atlas through that of random grasps which misses the requirements least.
 
     It lies in the slice of F in which the hand motions that k freezes are those of that grasp; the grasps X where none
     can grow there.
     """
-    x = X[int(objective.missed(X).argmin())]
+    x = X[int(plan.objective.missed(X).argmin())]
     problem = replace(plan.problem, x1=None, reference=None).at(x)
     try:
         system = problem.system(plan.dimension)

@@ -15,7 +15,7 @@ from graspatlas.analysis.unbounded import Around, levels_around, never_levels_of
 from graspatlas.errors import GraspAtlasError
 from graspatlas.multistart.census import Census, FoundPeak
 from graspatlas.multistart.checkpoint import RoundFolder
-from graspatlas.multistart.rounds import FIRST_STEP, Plan, Round, RoundKind, climbed, run_round
+from graspatlas.multistart.rounds import FIRST_STEP, Plan, Round, RoundKind, Starts, climbed, run_round
 from graspatlas.requirements.base import requirement_name
 from graspatlas.result.refinement import Refinement, SearchEnd, SearchReport
 from graspatlas.support.arrays import Array
@@ -66,11 +66,10 @@ class Search:
         self, plan: Plan, share: float, checkpoint: str | os.PathLike[str] | None, progress: bool | None
     ) -> None:
         self.plan, self.share, self.progress = plan, share, progress
-        self.objective = plan.objective
-        self.census = Census(self.objective.system.embed)
+        self.census = Census(plan.objective.system.embed)
         self.folder = None if checkpoint is None else RoundFolder(checkpoint, plan)
         self.rounds = 0
-        self._bounded: dict[int, bool] = {}
+        self._judged: dict[FoundPeak, bool] = {}
 
     def run(self, starts: Array, max_seconds: float | None, source: Source = one_by_one) -> Refinement | None:
         """The local maxima of the index over all feasible grasps that climbs from many starts find.
@@ -95,8 +94,7 @@ class Search:
             for kept in self.folder.load() if self.folder else ():
                 self._count(kept)
             if self.rounds == 0:
-                left = None if max_seconds is None else max(deadline - time.perf_counter(), 1e-3)
-                self._keep(climbed(self.plan, self.objective, 0, RoundKind.STATED, starts, 0, 0, start, left))
+                self._keep(climbed(self.plan, Starts(0, RoundKind.STATED, starts), deadline), deadline)
             bar.update(self.census.climbs)
             with closing(source(self.plan, self.rounds, deadline)) as rounds:
                 status = self._follow(rounds, deadline, bar)
@@ -117,12 +115,13 @@ class Search:
             new = next(rounds, None)
             if new is None:
                 return self._ended(deadline) or SearchEnd.ROUNDS
-            self._keep(new)
+            self._keep(new, deadline)
             bar.update(len(new.x))
             bar.note(self._told())
 
-    def _keep(self, new: Round) -> None:
-        if self.folder:
+    def _keep(self, new: Round, deadline: float) -> None:
+        """Count a round, and write it to the checkpoint unless its climbs were cut short."""
+        if self.folder and time.perf_counter() < deadline:
             with held():
                 self.folder.write(new)
         self._count(new)
@@ -150,17 +149,19 @@ class Search:
             return SearchEnd.ROUNDS if self.rounds > EMPTY_ROUNDS else None
         if self.rounds <= LEAST_ROUNDS:
             return None
-        if not best.converged and self._unbounded(best):
+        if self._unbounded(best):
             return SearchEnd.UNBOUNDED
         enough = self.census.share_missing <= self.share and best.hits >= BEST_HITS
         return SearchEnd.ENOUGH if enough else None
 
     def _unbounded(self, peak: FoundPeak) -> bool:
         """Whether the index grows without bound where climbs ended that have not converged."""
-        if id(peak.x) not in self._bounded:
-            levels = levels_around(partial(Around, self.objective), peak.x, peak.value, FIRST_STEP)
-            self._bounded[id(peak.x)] = not (rises_towards_one_point(levels) or never_levels_off(levels))
-        return not self._bounded[id(peak.x)]
+        if peak.converged:
+            return False
+        if peak not in self._judged:
+            levels = levels_around(partial(Around, self.plan.objective), peak.x, peak.value, FIRST_STEP)
+            self._judged[peak] = rises_towards_one_point(levels) or never_levels_off(levels)
+        return self._judged[peak]
 
     def _refinement(self, status: SearchEnd, seconds: float) -> Refinement | None:
         """What was found; None where nothing was."""
@@ -170,7 +171,7 @@ class Search:
         if status is not SearchEnd.INTERRUPTED:
             self._polish()
         peaks = census.ranked()
-        unbounded = [not peak.converged and self._unbounded(peak) for peak in peaks]
+        unbounded = np.array([self._unbounded(peak) for peak in peaks], bool)
         report = SearchReport(
             status=status,
             rounds=self.rounds,
@@ -188,10 +189,8 @@ class Search:
             qualities=np.array([peak.value for peak in peaks]),
             starts=np.full(len(peaks), -1, np.int64),
             converged=np.array([peak.converged for peak in peaks], bool),
-            stalled=np.array(
-                [not (peak.converged or runs_away) for peak, runs_away in zip(peaks, unbounded, strict=True)], bool
-            ),
-            unbounded=np.array(unbounded, bool),
+            stalled=np.array([peak.stalled for peak in peaks], bool) & ~unbounded,
+            unbounded=unbounded,
             steps=np.zeros(len(peaks), np.int64),
             kkt=np.array([peak.kkt for peak in peaks]),
             hits=np.array([peak.hits for peak in peaks], np.int64),
@@ -206,16 +205,11 @@ class Search:
         if best is None or best.converged or self._unbounded(best):
             return
         rng = np.random.default_rng(self.plan.seed)
-        system = self.objective.system
+        system = self.plan.objective.system
         steps = rng.normal(size=(POLISH_CLIMBS, system.tangent_size))
         steps *= 0.1 * FIRST_STEP / np.linalg.norm(steps, axis=1, keepdims=True)
         near = np.array([best.x, *(system.integrate(best.x, step) for step in steps)])
-        again = climbed(self.plan, self.objective, -1, RoundKind.STATED, near, 0, 0, time.perf_counter(), None)
-        for i in np.flatnonzero(again.converged):
-            if again.value[i] >= best.value * (1.0 - 1e-6):
-                best.x, best.value = again.x[i], float(again.value[i])
-                best.kkt, best.converged = float(again.kkt[i]), True
-                return
+        self.census.improve(climbed(self.plan, Starts(-1, RoundKind.STATED, near), deadline_after(None)))
 
 
 def nothing_meets(plan: Plan, census: Census) -> GraspAtlasError:

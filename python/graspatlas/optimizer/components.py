@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from enum import Enum
 from typing import TypedDict
 
 import numpy as np
@@ -31,6 +30,7 @@ from graspatlas.support.deadlines import deadline_after, seconds_until
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.progress import progress_bar
 from graspatlas.support.validation import check_keywords, whole
+from graspatlas.support.words import Word
 
 __all__ = ["Components", "SearchStatus", "find_components"]
 
@@ -43,16 +43,13 @@ SHORTEST = 1e-3
 SAMPLES = 50
 
 
-class SearchStatus(str, Enum):
+class SearchStatus(Word):
     """Why a search for components ended."""
 
     COVERED = "the last grasps found were all covered"
     NO_GRASP = "no grasp in many tries"
     TIME_LIMIT = "limit of time"
     INTERRUPTED = "interrupted"
-
-    def __str__(self) -> str:
-        return self.value
 
 
 class ComponentSummary(ResultSummary):

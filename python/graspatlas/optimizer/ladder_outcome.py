@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 from typing import TypedDict
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.optimizer.rungs import Rung, RungSummary
 from graspatlas.problem.problem import Problem
 from graspatlas.result.refinement import PeakStatus
-from graspatlas.support.files import write_csv
+from graspatlas.storage.files import write_csv
+from graspatlas.support.words import Word
 
 __all__ = ["Ladder", "LadderStatus", "LadderSummary"]
 
@@ -20,15 +20,12 @@ __all__ = ["Ladder", "LadderStatus", "LadderSummary"]
 ENOUGH = 0.01
 
 
-class LadderStatus(str, Enum):
+class LadderStatus(Word):
     """Why a ladder ended."""
 
     COMPLETE = "complete"
     TIME_LIMIT = "cut short: limit of time"
     INTERRUPTED = "cut short: interrupted"
-
-    def __str__(self) -> str:
-        return self.value
 
 
 class LadderSummary(TypedDict):

@@ -15,8 +15,8 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.numerics.groups import linked_groups
 from graspatlas.patches.base import Vector3, checked_length, checked_vector, placement
 from graspatlas.patches.spline import BSpline, clamped_knots
+from graspatlas.storage.files import is_file
 from graspatlas.support.arrays import Array, BoolArray, IntArray
-from graspatlas.support.files import is_file
 from graspatlas.support.validation import whole
 
 if TYPE_CHECKING:

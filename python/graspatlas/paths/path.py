@@ -24,9 +24,9 @@ from graspatlas.paths.time_parametrization import URDF, passing_times
 from graspatlas.quality.evaluation import INDICES, evaluate
 from graspatlas.requirements.lost import Lost
 from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.storage.columns import joined, pose_columns
+from graspatlas.storage.files import write_csv
 from graspatlas.support.arrays import Array, BoolArray, IntArray
-from graspatlas.support.columns import joined, pose_columns
-from graspatlas.support.files import write_csv
 from graspatlas.support.pickling import Light
 from graspatlas.support.renamed import renamed_attribute
 

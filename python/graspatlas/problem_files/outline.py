@@ -12,7 +12,7 @@ from graspatlas.hand.urdf import mimics, moving_joints
 from graspatlas.patches.registry import patch_types
 from graspatlas.problem.object_joint import FREE_FLYER, object_joint
 from graspatlas.problem_files import documents
-from graspatlas.support.files import read_text
+from graspatlas.storage.files import read_text
 
 __all__ = ["Outline", "read_outline"]
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.support.archives import DamagedArchive, read_arrays
+from graspatlas.storage.archives import DamagedArchive, read_arrays
+from graspatlas.storage.files import opened, read_text
 from graspatlas.support.arrays import Array
-from graspatlas.support.files import opened, read_text
 
 __all__ = ["read_postures"]
 

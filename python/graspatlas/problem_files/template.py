@@ -13,7 +13,7 @@ from graspatlas.hand.hand import Hand
 from graspatlas.hand.robot_files import described_robot, example_robot, find_file
 from graspatlas.patches.registry import patch_types
 from graspatlas.problem_files.reading import FILL_IN
-from graspatlas.support.files import is_file
+from graspatlas.storage.files import is_file
 
 __all__ = ["problem_template"]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.robot_files import robots_folder
 from graspatlas.problem.problem import Problem
-from graspatlas.support.files import is_file, read_text
+from graspatlas.storage.files import is_file, read_text
 
 __all__ = ["bundled_problems", "load_problem", "problem_text"]
 

@@ -83,9 +83,10 @@ def _section(section: Section) -> str:
 
 def _method() -> str:
     return (
-        "The local optimiser is SciPy's SLSQP in the tangent space of the current grasp, inside a box as wide as a "
-        "chart, with joint limits and patch intervals as constraints; it moves on until nothing around it is better, "
-        f"at most {MAX_STEPS} steps. It starts from {STARTS} charts drawn at random (seed {SEED}), or from all where "
+        "The local optimiser is sequential quadratic programming in the tangent space of the current grasp, with joint "
+        "limits, patch intervals and requirements as constraints; it moves on until the slope of the index vanishes or "
+        f"is held back by them, at most {MAX_STEPS} steps. It starts from {STARTS} charts drawn at random (seed "
+        f"{SEED}), or from all where "
         "fewer meet the requirements: grasps that the atlas gives it for nothing, so that it is a strong opponent. "
         "Ends that are less than half a chart radius apart count as one place."
     )

@@ -22,9 +22,9 @@ from graspatlas.quality.batched import quality_name
 from graspatlas.quality.evaluation import INDICES, evaluate
 from graspatlas.requirements.base import requirement_name
 from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.storage.columns import joined
+from graspatlas.storage.files import replaced, write_csv
 from graspatlas.support.arrays import AnyArray, Array, BoolArray, IntArray
-from graspatlas.support.columns import joined
-from graspatlas.support.files import replaced, write_csv
 from graspatlas.support.validation import PlainTable, whole
 from graspatlas.version import __version__
 

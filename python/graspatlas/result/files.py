@@ -19,9 +19,9 @@ from graspatlas.requirements.lost import Lost
 from graspatlas.requirements.named import parse_requirement
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.result.refinement import Refinement, SearchEnd, SearchReport
-from graspatlas.support.archives import DamagedArchive, read_arrays
+from graspatlas.storage.archives import DamagedArchive, read_arrays
+from graspatlas.storage.files import is_folder, opened, replaced, stated_path
 from graspatlas.support.arrays import AnyArray, Array, BoolArray
-from graspatlas.support.files import is_folder, opened, replaced, stated_path
 from graspatlas.support.validation import StatedTable, number, shown, whole
 
 __all__ = ["read_result", "save_result"]

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 
 from graspatlas.support.arrays import Array, BoolArray, IntArray
+from graspatlas.support.words import Word
 
 __all__ = ["PeakStatus", "Refinement", "SearchEnd", "SearchReport"]
 
 
-class PeakStatus(str, Enum):
+class PeakStatus(Word):
     """What a place is at which a climb ended."""
 
     MAXIMUM = "maximum"
@@ -18,11 +18,8 @@ class PeakStatus(str, Enum):
     UNBOUNDED = "unbounded"
     GIVEN_UP = "given up"
 
-    def __str__(self) -> str:
-        return self.value
 
-
-class SearchEnd(str, Enum):
+class SearchEnd(Word):
     """Why a search over all feasible grasps ended."""
 
     ENOUGH = "little can be missing"
@@ -30,9 +27,6 @@ class SearchEnd(str, Enum):
     ROUNDS = "limit of rounds"
     TIME_LIMIT = "limit of time"
     INTERRUPTED = "interrupted"
-
-    def __str__(self) -> str:
-        return self.value
 
 
 @dataclass(frozen=True)
@@ -83,7 +77,7 @@ class Refinement:
         stalled: True where it ended because no smaller step gained anything, though the slope of the index does not
             vanish: on a kink, or where numbers are not exact enough [p].
         unbounded: True where the index has no maximum but grows without bound, as far as numbers can tell [p].
-        steps: Steps of the climb to each [p].
+        steps: Steps of the climb to each [p]; 0 where they were not kept, as by a search over all of F.
         kkt: Largest residual of the conditions of Karush, Kuhn and Tucker there, of the logarithm of the index [p]; at
             most 1e-6 where ``converged``.
         hits: Climbs that ended at each [p].

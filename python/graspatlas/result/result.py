@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +27,7 @@ from graspatlas.result.summary import (
     ResultSummary,
 )
 from graspatlas.result.verification import check_result
-from graspatlas.support.columns import joined, to_frame
+from graspatlas.storage.columns import joined, to_frame
 from graspatlas.support.renamed import renamed_keyword
 
 if TYPE_CHECKING:
@@ -203,18 +203,7 @@ class Result(GraspAtlas):
             "object_quat_xyzw": best.object_quat_xyzw.tolist(),
         }
         if search:
-            summary["search"] = {
-                "status": str(search.status),
-                "rounds": search.rounds,
-                "climbs": search.climbs,
-                "met": search.met,
-                "peaks": search.peaks,
-                "best_hits": search.best_hits,
-                "share_missing": search.share_missing,
-                "tries": search.tries,
-                "seed": search.seed,
-                "seconds": search.seconds,
-            }
+            summary["search"] = {**asdict(search), "status": str(search.status)}
         return summary
 
     def save(self, path: str | os.PathLike[str]) -> None:

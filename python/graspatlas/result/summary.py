@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TypedDict
+from typing import Any, TypedDict
 
 from typing_extensions import NotRequired
 
@@ -81,21 +81,6 @@ class PeakSummary(TypedDict):
     kkt: float | None
 
 
-class SearchSummary(TypedDict):
-    """What a search over all feasible grasps did; see :class:`graspatlas.SearchReport`."""
-
-    status: str
-    rounds: int
-    climbs: int
-    met: int
-    peaks: int
-    best_hits: int
-    share_missing: float
-    tries: int
-    seed: int
-    seconds: float
-
-
 class RefinementSummary(TypedDict):
     """The best of the refined maxima; no gain where the index grows without bound, or no chart is accepted."""
 
@@ -108,7 +93,7 @@ class RefinementSummary(TypedDict):
     starts: int
     share_missing: float | None
     peaks: list[PeakSummary]
-    search: NotRequired[SearchSummary]
+    search: NotRequired[dict[str, Any]]
     n_peaks: int
     n_unbounded: int
     advice: str

@@ -10,8 +10,8 @@ from typing import Any, TypedDict
 import numpy as np
 
 from graspatlas.errors import GraspAtlasError
+from graspatlas.storage.files import read_text, replaced
 from graspatlas.support.arrays import Array, BoolArray, IntArray
-from graspatlas.support.files import read_text, replaced
 
 __all__ = ["Simulation", "SimulationSummary", "TrialRecord", "load_simulation"]
 

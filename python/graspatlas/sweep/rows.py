@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.support.files import opened, replaced
+from graspatlas.storage.files import opened, replaced
 
 if TYPE_CHECKING:
     import pyarrow as pa

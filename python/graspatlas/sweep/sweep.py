@@ -20,7 +20,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.quality.evaluation import find_index
 from graspatlas.requirements.named import parse_requirement
 from graspatlas.result.refinement import PeakStatus
-from graspatlas.support.files import writable_folder
+from graspatlas.storage.files import writable_folder
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.progress import progress_bar
 from graspatlas.sweep.rows import ROWS, Row, read_rows, write_rows

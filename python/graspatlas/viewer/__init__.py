@@ -65,7 +65,7 @@ def export_html(shown: Shown | Scene, path: str | os.PathLike[str]) -> None:
     Raises:
         GraspAtlasError: If a mesh cannot be read or the file cannot be written.
     """
-    from graspatlas.support.files import replaced
+    from graspatlas.storage.files import replaced
     from graspatlas.viewer.scene.scene import Scene
     from graspatlas.viewer.web.animation_page import film_page
     from graspatlas.viewer.web.page import page
@@ -100,7 +100,7 @@ def save_picture(
     Raises:
         GraspAtlasError: If the size is too small, a mesh cannot be read or the file cannot be written.
     """
-    from graspatlas.support.files import replaced
+    from graspatlas.storage.files import replaced
     from graspatlas.viewer.render.film_strip import FRAMES, draw_rows, draw_strip
     from graspatlas.viewer.render.picture import check_size, draw
     from graspatlas.viewer.scene.path_film import path_film
