@@ -70,7 +70,7 @@ wheel: $(VENV)/bin/python
 	$(BIN)/python -m build --outdir dist
 	$(BIN)/twine check --strict dist/*
 	$(BIN)/check-wheel-contents dist/*.whl
-	test $$(wc -c < dist/*.whl) -le 4000000
+	test $$(cat dist/*.whl | wc -c) -le 4000000
 	$(PYTHON) -m venv $(FRESH)
 	$(ALONE) $(FRESH)/bin/python -m pip install --quiet $$(ls dist/*.whl)
 	! $(ALONE) $(FRESH)/bin/python -c "import shutil, sys; sys.exit(not any(map(shutil.which, ['c++', 'g++', 'clang++'])))"

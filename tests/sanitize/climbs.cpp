@@ -16,7 +16,7 @@ namespace {
 
 using namespace graspatlas;
 
-constexpr std::int64_t kStarts = 12;
+constexpr std::int64_t kStarts = 2;
 
 // Grasps around the first one, some far away: many miss what is required of them.
 std::vector<double> starts(GraspSystem& system, const std::vector<double>& x1) {
