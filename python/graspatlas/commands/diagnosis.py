@@ -13,8 +13,11 @@ from graspatlas.atlas.status import Status
 from graspatlas.collision.checker import CollisionChecker
 from graspatlas.collision.hulls import LARGEST_ERROR
 from graspatlas.errors import GraspAtlasError
+from graspatlas.grasps.grasps import Grasps
+from graspatlas.optimizer.first_grasp import with_good_first_grasp
 from graspatlas.problem.problem import Problem
-from graspatlas.search.grasp_search import with_first_grasp
+from graspatlas.requirements.base import asked
+from graspatlas.search.random_starts import hand_size
 from graspatlas.support.arrays import Array
 
 __all__ = ["NOTE", "OK", "PROBLEM", "Finding", "diagnose", "redundant_joints", "report"]
@@ -39,6 +42,8 @@ LITTLE_VARIANCE = 0.9
 SAME_VARIANCE = 1e-9
 #: A first grasp turned by more than this from the guess is pointed out: something is not where it was thought [rad].
 FAR_FROM_GUESS = 0.8
+#: And so is one that is farther off than this share of the hand's size.
+FAR_SHARE = 0.1
 #: How long to look for a first grasp where none is given [s].
 SEARCH_SECONDS = 10.0
 #: How long an atlas may grow for the estimate of its size [s], and how often its radius may be doubled.
@@ -80,10 +85,10 @@ def diagnose(problem: Problem, *, dimension: int | None = None, radius: float | 
     findings = [*_mimics(problem), _size(problem)]
     if problem.x1 is None:
         try:
-            problem = with_first_grasp(problem, _searched_dimension(problem, dimension), SEARCH_SECONDS, False)
+            problem = with_first_grasp_for(problem, dimension)
         except GraspAtlasError as error:
             return [*findings, Finding(PROBLEM, "first grasp", str(error), "what follows is not known without one")]
-        findings.append(_found(problem))
+        findings += [_found(problem), *_unmet(problem)]
     try:
         t = problem.full_dimension
     except GraspAtlasError as error:
@@ -109,9 +114,19 @@ def _searched_dimension(problem: Problem, dimension: int | None) -> int:
     return wanted
 
 
+def with_first_grasp_for(problem: Problem, dimension: int | None) -> Problem:
+    """The problem with a first grasp, for the dimension that is wanted; see :func:`with_good_first_grasp`.
+
+    Raises:
+        GraspAtlasError: If none is found.
+    """
+    k = _searched_dimension(problem, dimension)
+    return with_good_first_grasp(problem, k, problem.requirements, SEARCH_SECONDS, False)
+
+
 def _found(problem: Problem) -> Finding:
     """A first grasp was found; how far it is from where it was wanted."""
-    text, hint = "none given, but one is found", "x1 below is the one found"
+    text, hint = "none given, but one is found", "x1 below is the one found; check --write-x1 writes it into the file"
     guess, x1 = problem.pose_guess, problem.x1
     if guess is not None and x1 is not None:
         from scipy.spatial.transform import Rotation  # slow to import
@@ -122,7 +137,21 @@ def _found(problem: Problem) -> Finding:
         if guess.quat_xyzw and angle > FAR_FROM_GUESS:
             hint = "a normal, an axis or a frozen u may be wrong; or state a reference, the hand about to close"
             return Finding(NOTE, "first grasp", text, hint)
+        if metres > FAR_SHARE * hand_size(problem):
+            hint = (
+                "no nearer one was found: look whether the fingers can close round the object there, and at its frame"
+            )
+            return Finding(NOTE, "first grasp", text, hint)
     return Finding(OK, "first grasp", text, hint)
+
+
+def _unmet(problem: Problem) -> Iterator[Finding]:
+    """The requirements that a first grasp which was found misses."""
+    grasps = Grasps(problem, problem.x1_array[None], problem.full_system)
+    missed = [str(each) for each in problem.requirements if not asked(each, grasps)[0]]
+    if missed:
+        text = f"the first grasp that was found misses {', '.join(missed)}, and no grasp that meets all was found"
+        yield Finding(NOTE, "requirements", text, "an atlas may hold some all the same; or these contacts allow none")
 
 
 def _mimics(problem: Problem) -> Iterator[Finding]:

@@ -8,9 +8,10 @@ import os
 from pathlib import Path
 
 from graspatlas.commands.arguments import Subcommands, path_word
-from graspatlas.commands.diagnosis import PROBLEM, Finding, diagnose, report
+from graspatlas.commands.diagnosis import OK, PROBLEM, Finding, diagnose, report, with_first_grasp_for
 from graspatlas.errors import GraspAtlasError
-from graspatlas.problems import load_problem
+from graspatlas.problem.problem import Problem
+from graspatlas.problems import bundled_problems, load_problem, problem_text
 from graspatlas.storage.files import replaced
 from graspatlas.support.terminal import say
 
@@ -32,6 +33,9 @@ def add_commands(commands: Subcommands) -> None:
     check.add_argument("problem", help="path of a problem file, or name of a bundled problem")
     check.add_argument("--dimension", type=int, metavar="K", help="dimension k to look at")
     check.add_argument("--radius", type=float, metavar="R", help="radius of a chart to look at")
+    check.add_argument(
+        "--write-x1", action="store_true", help="write the first grasp that is found into the file, which states none"
+    )
     check.add_argument("--json", action="store_true", help="print the findings as JSON")
     check.set_defaults(run=_check)
 
@@ -52,13 +56,34 @@ def _new(options: argparse.Namespace) -> int:
 def _check(options: argparse.Namespace) -> int:
     from graspatlas.problem_files import ProblemFileError  # slow to import
 
+    written: list[Finding] = []
     try:
-        findings = diagnose(load_problem(options.problem), dimension=options.dimension, radius=options.radius)
+        problem = load_problem(options.problem)
+        if options.write_x1:
+            problem, written = _with_x1_written(problem, options.problem, options.dimension)
+        findings = [*diagnose(problem, dimension=options.dimension, radius=options.radius), *written]
     except ProblemFileError as error:
         hint = "every field is explained in docs/problem_files.md"
         findings = [Finding(PROBLEM, "problem file", fault, hint) for fault in error.faults]
     say(json.dumps([finding.to_dict() for finding in findings]) if options.json else report(findings))
     return int(any(finding.mark == PROBLEM for finding in findings))
+
+
+def _with_x1_written(problem: Problem, file: str, dimension: int | None) -> tuple[Problem, list[Finding]]:
+    """The problem with a first grasp that is found, which is written into its file too."""
+    from graspatlas.problem_files.first_grasp_in_file import with_x1  # slow to import
+
+    if file in bundled_problems():
+        raise GraspAtlasError(f"'{file}' is a bundled problem, whose file is not written to; copy it")
+    text, _, _ = problem_text(file)
+    if problem.x1 is not None:
+        raise GraspAtlasError(f"'{file}' states an x1 already: remove it to have another one written")
+    found = with_first_grasp_for(problem, dimension)
+    if found.x1 is None:  # it has one, or the search has raised
+        raise GraspAtlasError(f"no first grasp of '{file}' was found")
+    with replaced(Path(file)) as stream:
+        stream.write(with_x1(text, found.x1).encode("utf-8"))
+    return found, [Finding(OK, "x1", f"written into {file}", "what is said above is of it")]
 
 
 def _schema(options: argparse.Namespace) -> int:

@@ -30,6 +30,7 @@ from graspatlas.analysis.climb import MAX_STEPS, climb
 from graspatlas.atlas.limits import LimitOptions
 from graspatlas.atlas.status import Status
 from graspatlas.errors import GraspAtlasError
+from graspatlas.optimizer.first_grasp import with_good_first_grasp
 from graspatlas.optimizer.ladder_outcome import Ladder, LadderStatus
 from graspatlas.optimizer.optimize import optimize
 from graspatlas.optimizer.options import with_defaults
@@ -39,7 +40,6 @@ from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.requirements.base import RequirementLike
 from graspatlas.result.refinement import PeakStatus
 from graspatlas.result.result import Result
-from graspatlas.search.grasp_search import with_first_grasp
 from graspatlas.support.deadlines import deadline_after, seconds_until
 from graspatlas.support.interrupts import keeping, stoppable, stopping
 from graspatlas.support.progress import counted
@@ -118,7 +118,9 @@ def ladder(
     limits.setdefault("max_seconds", MAX_SECONDS)
     limits.setdefault("max_charts", SPARE * charts)
     deadline = deadline_after(limits["max_seconds"])
-    problem = with_first_grasp(problem, ks[0], limits["max_seconds"], progress)
+    problem = with_good_first_grasp(
+        problem, ks[0], problem.requirements if require is None else require, limits["max_seconds"], progress
+    )
     climber = _Climber(problem, ks, radii, charts, deadline, refine_steps if refine else 0)
     status = LadderStatus.COMPLETE
     with keeping(rungs=climber.rungs):

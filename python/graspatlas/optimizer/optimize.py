@@ -17,13 +17,13 @@ from graspatlas.atlas.limits import LimitOptions, Limits
 from graspatlas.errors import GraspAtlasError
 from graspatlas.multistart.search import SHARE
 from graspatlas.optimizer.all_motions import check_motions, check_workers, slice_dimension, with_best_of_all
+from graspatlas.optimizer.first_grasp import with_good_first_grasp
 from graspatlas.optimizer.options import several_indices, with_defaults
 from graspatlas.optimizer.readings import Reading, check_atlas_of
 from graspatlas.problem.problem import Problem
 from graspatlas.quality.batched import Quality
 from graspatlas.requirements.base import RequirementLike
 from graspatlas.result.result import Result
-from graspatlas.search.grasp_search import with_first_grasp
 from graspatlas.support.deadlines import seconds_until
 from graspatlas.support.interrupts import keeping, stoppable, stopping
 from graspatlas.support.validation import positive, whole
@@ -114,7 +114,9 @@ def optimize(
         raise GraspAtlasError(f"refine must be True, False, 'relevant' or 'feasible', got {refine!r}")
     whole(refine_steps, "refine_steps")
     reading = Reading(several_indices(options["quality"]), problem.requirements if require is None else require)
-    problem = with_first_grasp(problem, options["dimension"], limits.get("max_seconds"), progress)
+    problem = with_good_first_grasp(
+        problem, options["dimension"], reading.requirements, limits.get("max_seconds"), progress
+    )
     if atlas is None:
         system, x0 = problem.system(options["dimension"]), problem.start(options["dimension"])
         reading.try_out(problem, system, x0)

@@ -31,7 +31,7 @@ def joint_units(hand: Hand, length_scale: float) -> Array:
 
 
 def grasp_system(
-    hand: Hand, contacts: Sequence[Contact], joint: ObjectJoint, motions: Array, length_scale: float
+    hand: Hand, contacts: Sequence[Contact], joint: ObjectJoint, motions: Array, length_scale: float, room: float = 0.0
 ) -> _core.GraspSystem:
     """The contact equations of all grasps that some hand motions allow.
 
@@ -41,6 +41,7 @@ def grasp_system(
         joint: How the object moves.
         motions: The hand motions that are kept, columns of joint velocities (nv, p).
         length_scale: Length that counts as much as one radian [m].
+        room: Share of each range, of a joint or of a patch parameter, to keep off either of its ends.
     """
     model, mechanism, units = joint.model(hand.tree), hand.mechanism, joint_units(hand, length_scale)
     if mechanism.mimics or (units != 1.0).any():
@@ -50,9 +51,10 @@ def grasp_system(
     for contact in contacts:
         of_hand, of_object = contact.sides
         carrier, T = hand.frame(contact.frame)
-        sides.append((of_hand.core(carrier, T), of_object.core(model.object_joint, np.eye(4))))
+        sides.append((of_hand.core(carrier, T, room), of_object.core(model.object_joint, np.eye(4), room)))
     lower, upper = hand.binding_limits
-    limits = list(lower), list(upper)
+    kept_off = room * np.where(np.isfinite(upper - lower), upper - lower, 0.0)
+    limits = list(lower + kept_off), list(upper - kept_off)
     return _core.GraspSystem(model, sides, motions, length_scale, *limits, mechanism.transmission)
 
 

@@ -46,20 +46,24 @@ class ContactSide:
         u, v = self.patch.locate(point)
         return float(self.frozen.get("u", u)), float(self.frozen.get("v", v))
 
-    def core(self, joint: int, T_joint_body: Array) -> _core.ContactSide:
+    def core(self, joint: int, T_joint_body: Array, room: float = 0.0) -> _core.ContactSide:
         """The compiled side.
 
         Args:
             joint: Number of the joint that carries the body.
             T_joint_body: Placement of the body's frame in this joint (4, 4).
+            room: Share of the interval of each parameter to keep off either of its ends.
         """
         parameters = []
         for name in ("u", "v"):
             free = name in self.free
             interval = self.patch.interval(name) if free else None
             low, high = interval or (-np.pi, np.pi)
+            kept_off = room * (high - low) if np.isfinite(high - low) else 0.0
             value = float(self.frozen.get(name, 0.0))
-            parameters.append(_core.PatchParameter(free, value, free and interval is None, low, high))
+            parameters.append(
+                _core.PatchParameter(free, value, free and interval is None, low + kept_off, high - kept_off)
+            )
         return _core.ContactSide(joint, T_joint_body, self.patch.core(), *parameters)
 
 

@@ -232,17 +232,23 @@ class Problem(Light):
             self.motions.check_frozen(s)
         return s
 
-    def system(self, dimension: int) -> _core.GraspSystem:
-        """The system R of relevant grasps of this dimension: eqs (11) to (13)."""
+    def system(self, dimension: int, *, room: float = 0.0) -> _core.GraspSystem:
+        """The system R of relevant grasps of this dimension: eqs (11) to (13).
+
+        Args:
+            dimension: k.
+            room: Share of each range, of a joint or of a patch parameter, to keep off either of its ends, from 0 on and
+                less than a half.
+        """
         s = self.frozen_motions(dimension)
         mechanism = self.hand.mechanism
         if s == 0 or self.motions is None:
-            return self._system(mechanism.transmission)
-        return self._system(mechanism.constrained(self.motions).kept(s + len(mechanism.mimics)))
+            return self._system(mechanism.transmission, room)
+        return self._system(mechanism.constrained(self.motions).kept(s + len(mechanism.mimics)), room)
 
-    def _system(self, motions: Array) -> _core.GraspSystem:
+    def _system(self, motions: Array, room: float = 0.0) -> _core.GraspSystem:
         """The system that keeps these hand motions, columns of joint velocities (nv, p)."""
-        return grasp_system(self.hand, self.contacts, self.object_joint_model, motions, self.length_scale)
+        return grasp_system(self.hand, self.contacts, self.object_joint_model, motions, self.length_scale, room)
 
     @cached_property
     def reference_posture(self) -> Mapping[str, float]:

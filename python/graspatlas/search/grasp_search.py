@@ -124,13 +124,14 @@ class GraspSearch:
         problem: The problem.
         dimension: k.
         seed: Of the random numbers.
+        room: Share of each range, of a joint or of a patch parameter, to keep off either of its ends.
 
     Raises:
         GraspAtlasError: If the problem has no such dimension, or the reference leaves the hand no posture.
     """
 
-    def __init__(self, problem: Problem, dimension: int, seed: int | Sequence[int]) -> None:
-        self.system = problem.system(dimension)
+    def __init__(self, problem: Problem, dimension: int, seed: int | Sequence[int], room: float = 0.0) -> None:
+        self.system = problem.system(dimension, room=room)
         # Where all feasible grasps are sought the reference is but the middle of the postures that are drawn.
         frozen = problem.frozen_motions(dimension) > 0
         self.problem = replace(problem, reference=problem.reference_posture) if frozen else problem
@@ -181,6 +182,11 @@ class GraspSearch:
         found = self._tried((self._starts.draw(self._rng) if start is None else start)[None])
         return found[0] if len(found) else None
 
+    def attempts_near_guess(self) -> Array:
+        """All tries near the problem's pose guess, on all cores: the feasible grasps that they gave (n, size of x)."""
+        starts = list(self._near_guess)
+        return self._tried(np.array(starts).reshape(len(starts), self.system.configuration_size))
+
     def attempts(self, count: int) -> Array:
         """So many tries at random, on all cores: the feasible grasps that they gave (n, size of x)."""
         return self._tried(np.array([self._starts.draw(self._rng) for _ in range(count)]))
@@ -188,6 +194,8 @@ class GraspSearch:
     def _tried(self, starts: Array) -> Array:
         """The feasible grasps to which starts lead."""
         self.tries += len(starts)
+        if not len(starts):
+            return starts
         projected, there = _core.project_far(self.system, starts)
         X: Array = np.asarray(projected)[np.asarray(there)]
         X = X[[self._starts.has_posture_of(x) for x in X]] if len(X) else X

@@ -13,7 +13,7 @@ from graspatlas.support.arrays import Array
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-__all__ = ["Starts"]
+__all__ = ["Starts", "hand_size"]
 
 #: Steps of the random walk through the hand postures from one start to the next.
 WALK_STEPS = 12
@@ -44,8 +44,7 @@ class Starts:
         q = problem.reference_array
         self._pose = slice(len(q), len(q) + self._joint.size)
         self._reference = np.r_[q, self._joint.neutral, np.zeros(system.n_parameters)]
-        places = problem.hand.link_placements(q)
-        self.hand_size = max(float(np.linalg.norm(T[:3, 3])) for T in places.values()) + problem.length_scale
+        self.hand_size = hand_size(problem)
         free = [patch.interval(name) or (-HALF_TURN, HALF_TURN) for c in problem.contacts for patch, name in c.free()]
         ends = np.array(free, float).reshape(-1, 2)
         self._lower, self._upper = np.where(np.isinf(ends), np.sign(ends) * self.hand_size, ends).T
@@ -158,6 +157,12 @@ class Starts:
         R, t = _best_motion(of[:, :d] @ any_way.T, to[:, :d])
         x[self._pose] = self._joint.from_motion(R @ any_way, t)
         return x
+
+
+def hand_size(problem: Problem) -> float:
+    """Distance of the farthest link from the palm's origin in the reference posture, and a little more [m]."""
+    places = problem.hand.link_placements(problem.reference_array)
+    return max(float(np.linalg.norm(T[:3, 3])) for T in places.values()) + problem.length_scale
 
 
 def _best_motion(of: Array, to: Array) -> tuple[Array, Array]:
