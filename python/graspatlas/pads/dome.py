@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from graspatlas.collision.shapes import Shape
+from graspatlas.pads.reach import FITS, LARGEST_ANGLE, LARGEST_TURN, Dome, widened
 from graspatlas.pads.surface import frame_along, look
 from graspatlas.patches.base import Patch, Vector3
 from graspatlas.patches.flat import Plane
@@ -16,14 +16,12 @@ from graspatlas.patches.spline import BSpline, clamped_knots
 from graspatlas.patches.turned import Cylinder
 from graspatlas.support.arrays import Array
 
-__all__ = ["Dome", "fit_dome"]
+__all__ = ["fit_dome"]
 
-#: A simple patch fits where it is everywhere as near to the surface as this [m].
-FITS = 2e-4
 #: Rays along each side of the square that is fitted.
 RAYS = 33
-#: The surface may turn by this much within the square [rad], and no two rays meet it farther apart in height.
-LARGEST_TURN = np.radians(65.0)
+#: One that is nearer than this everywhere is what the surface was made as [m].
+EXACT = 2e-5
 #: Squares are tried from the largest on, each smaller by this factor, down to this share of the largest.
 SHRINK, SMALLEST = 0.85, 0.2
 #: A simpler patch is preferred to one of the largest square where its own is at least this share of that.
@@ -34,25 +32,6 @@ FLAT = 1e-3
 NET, DEGREE = 7, 3
 #: How often the normal is found anew, looking along the one before.
 TURNS = 3
-#: Largest longitude of round patches [rad].
-LARGEST_ANGLE = 1.2
-
-
-@dataclass(frozen=True)
-class Dome:
-    """A patch and how well it fits.
-
-    Attributes:
-        patch: The patch, whose point (0, 0) is the middle.
-        error: Largest distance of the surface from it, along the normal [m].
-        half: Half the side of the square that was fitted [m].
-        rank: Place of its kind in the order from simple to general.
-    """
-
-    patch: Patch
-    error: float
-    half: float
-    rank: int
 
 
 def fit_dome(shapes: Sequence[Shape], point: Array, direction: Array, along: Array, largest: float) -> Dome | None:
@@ -69,35 +48,33 @@ def fit_dome(shapes: Sequence[Shape], point: Array, direction: Array, along: Arr
         The patch; one of more general kind where the simple ones do not fit or only on less than half the square; None
         where the surface has an edge or a hole on the smallest square too.
     """
-    found: dict[int, Dome] = {}
+    found: dict[tuple[int, bool], Dome] = {}
     half = largest
     while half >= SMALLEST * largest:
-        for dome in _domes(shapes, point, direction, along, half, set(found)):
-            found[dome.rank] = dome
-        if 0 in found:
+        for dome in _domes(shapes, point, direction, along, half):
+            found.setdefault((dome.rank, False), dome)
+            if dome.error <= EXACT:
+                found.setdefault((dome.rank, True), dome)
+        if (0, True) in found:
             break
         half *= SHRINK
     if not found:
         return None
-    widest = max(dome.half for dome in found.values())
-    return next(found[rank] for rank in sorted(found) if found[rank].half >= WIDE_ENOUGH * widest)
+    enough = WIDE_ENOUGH * max(dome.half for dome in found.values())
+    kinds = sorted(found, key=lambda kind: (kind[0], not kind[1]))
+    return widened(shapes, next(found[kind] for kind in kinds if found[kind].half >= enough), largest)
 
 
-def _domes(
-    shapes: Sequence[Shape], point: Array, direction: Array, along: Array, half: float, known: set[int]
-) -> Iterator[Dome]:
-    """Patches of kinds not known yet that fit on a square."""
+def _domes(shapes: Sequence[Shape], point: Array, direction: Array, along: Array, half: float) -> Iterator[Dome]:
+    """Patches that fit on a square."""
     seen = _square(shapes, point, direction, along, half)
     if seen is None:
         return
     T, ticks, heights = seen
-    kinds = (_plane, _sphere, _cylinder, _ellipsoid, _spline)
-    for rank, kind in enumerate(kinds):
-        if rank in known:
-            continue
+    for rank, kind in enumerate((_plane, _sphere, _cylinder, _ellipsoid, _spline)):
         made = kind(T, ticks, heights)
         if made is not None and made[1] <= FITS:
-            yield Dome(*made, half, rank)
+            yield Dome(*made, half, rank, T)
 
 
 def _square(
@@ -228,10 +205,10 @@ def _ellipsoid(T: Array, ticks: Array, heights: Array) -> Made | None:
     x, y = _offsets(T, turned, ticks)
     reach = float(np.hypot(half, half))
 
-    # z = top + A (sqrt(1 - x^2 k / A - y^2 l / A) - 1) bends by k and l at the top, for any A.
+    # z = top + A (sqrt(1 - x^2 k / A - y^2 m / A) - 1) bends by k and m at the top, for any A.
     def surface(w: Array) -> Array:
-        top, A, k, l = w
-        return np.asarray(top + A * (np.sqrt(np.maximum(1.0 - (k * x**2 + l * y**2) / A, 1e-6)) - 1.0))
+        top, A, k, m = w
+        return np.asarray(top + A * (np.sqrt(np.maximum(1.0 - (k * x**2 + m * y**2) / A, 1e-6)) - 1.0))
 
     start = [heights[RAYS // 2, RAYS // 2], 1.5 * reach, most, least]
     bounds = ([-half, 0.1 * half, 1e-3 / half, 1e-3 / half], [half, 20.0 * half, 5.0 / half, 5.0 / half])
@@ -241,8 +218,8 @@ def _ellipsoid(T: Array, ticks: Array, heights: Array) -> Made | None:
         bounds=bounds,
         x_scale=[half, half, 1 / half, 1 / half],
     )
-    top, A, k, l = map(float, fitted.x)
-    B, C = float(np.sqrt(A / l)), float(np.sqrt(A / k))
+    top, A, k, m = map(float, fitted.x)
+    B, C = float(np.sqrt(A / m)), float(np.sqrt(A / k))
     patch = Ellipsoid(
         semi_axes=(A, B, C),
         origin=_triple(T[:3, 3] + (top - A) * T[:3, 2]),

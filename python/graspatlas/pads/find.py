@@ -14,8 +14,9 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.hand import Hand
 from graspatlas.hand.mesh_files import check_meshes
 from graspatlas.pads.closing import Closing
-from graspatlas.pads.dome import Dome, fit_dome
+from graspatlas.pads.dome import fit_dome
 from graspatlas.pads.pad import Pad
+from graspatlas.pads.reach import Dome
 from graspatlas.pads.surface import bounding_points, frame_along, look
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import checked_instance
@@ -28,6 +29,8 @@ RAYS = 96
 FRONT = 0.03
 #: The largest patch reaches this share of the link's width to each side.
 LARGEST = 0.45
+#: A fingertip whose patch is smaller than this share of its width has an edge there.
+NARROW = 0.12
 #: How often the closing direction of the point that is found is asked again.
 ROUNDS = 3
 
@@ -37,6 +40,11 @@ class _Body:
     """What one joint carries, or the palm: shapes in the joint's frame."""
 
     shapes: tuple[Shape, ...]
+
+    @cached_property
+    def width(self) -> float:
+        """How wide the body is, being longer one way and perhaps thinner another [m]."""
+        return float(np.sort(np.ptp(self.corners, axis=0))[1])
 
     @cached_property
     def corners(self) -> Array:
@@ -131,7 +139,7 @@ def _links(bodies: dict[int, _Body]) -> list[str]:
 
 
 def _fingertip(closing: Closing, body: _Body, number: int) -> Pad:
-    """The pad at the front of a link, where its finger closes; where that is an edge, where its last joint alone does."""
+    """The pad at the front of a link where its finger closes; where that is an edge, where its last joint alone does."""
     best: _Place | None = None
     for last in (False, True):
         point = _end(body)
@@ -139,8 +147,10 @@ def _fingertip(closing: Closing, body: _Body, number: int) -> Pad:
             direction = closing.direction(number, point, last=last)
             point = _front(body, direction)
         place = _dome(closing, body, number, point, direction)
-        if place is not None and (best is None or place.dome.half > 2.0 * best.dome.half):
+        if place is not None and (best is None or place.dome.half > best.dome.half):
             best = place
+        if best is not None and best.dome.half > NARROW * body.width:
+            break
     return _pad(closing, body, best)
 
 
@@ -201,7 +211,7 @@ def _dome(closing: Closing, body: _Body, number: int, point: Array, direction: A
     along = np.cross(np.array(joint.axis), direction) if joint and not joint.slides else np.eye(3)[np.argmax(size)]
     shapes = [replace(shape, placement=to_link @ shape.placement) for shape in body.shapes]
     at, towards, u_axis = to_link[:3, :3] @ point + to_link[:3, 3], to_link[:3, :3] @ direction, to_link[:3, :3] @ along
-    dome = fit_dome(shapes, at, towards, u_axis, LARGEST * float(np.sort(size)[1]))
+    dome = fit_dome(shapes, at, towards, u_axis, LARGEST * body.width)
     return None if dome is None else _Place(link, dome)
 
 
