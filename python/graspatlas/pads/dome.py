@@ -30,6 +30,8 @@ WIDE_ENOUGH = 0.5
 FLAT = 1e-3
 #: Control points of a spline along u and v, and its degree.
 NET, DEGREE = 7, 3
+#: The normal is that of the rays within so many of the middle one.
+NEAR = 5
 #: How often the normal is found anew, looking along the one before.
 TURNS = 3
 
@@ -80,7 +82,7 @@ def _domes(shapes: Sequence[Shape], point: Array, direction: Array, along: Array
 def _square(
     shapes: Sequence[Shape], point: Array, direction: Array, along: Array, half: float
 ) -> tuple[Array, Array, Array] | None:
-    """A frame (4, 4) on the surface with z along its mean normal, the places of the rays (n,) and heights (n, n)."""
+    """A frame (4, 4) on the surface with z along its normal, the places of the rays (n,) and heights (n, n)."""
     ticks, z, at = np.linspace(-half, half, RAYS), direction, point
     for turn in range(TURNS + 1):
         T = frame_along(z, at, along)
@@ -90,7 +92,8 @@ def _square(
             return None
         if turn == TURNS:
             return T, ticks, heights
-        slope, middle = _quadratic(ticks, heights)[1:3], heights[RAYS // 2, RAYS // 2]
+        near = slice(RAYS // 2 - NEAR, RAYS // 2 + NEAR + 1)
+        slope, middle = _quadratic(ticks[near], heights[near, near])[1:3], heights[RAYS // 2, RAYS // 2]
         at = T[:3, 3] + middle * T[:3, 2]
         z = T[:3, :3] @ [-slope[0], -slope[1], 1.0]
         z = z / np.linalg.norm(z)

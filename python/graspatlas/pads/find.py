@@ -12,6 +12,7 @@ from graspatlas import _core
 from graspatlas.collision.shapes import Shape, read_shapes
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.hand import Hand
+from graspatlas.hand.embedded_meshes import mesh_folders
 from graspatlas.hand.mesh_files import check_meshes
 from graspatlas.pads.closing import Closing
 from graspatlas.pads.dome import fit_dome
@@ -93,7 +94,7 @@ def find_pads(hand: Hand, links: Sequence[str] | None = None) -> tuple[Pad, ...]
 def _bodies(hand: Hand) -> dict[int, _Body]:
     """The shapes of each joint, collision shapes where it has some; the palm is 0."""
     check_meshes(hand)
-    collision = read_shapes(hand.tree, hand.urdf, hand.package_dirs)
+    collision = read_shapes(hand.tree, hand.urdf, mesh_folders(hand))
     by_joint: dict[int, list[Shape]] = {}
     for shape in collision:
         by_joint.setdefault(shape.joint, []).append(shape)
@@ -108,7 +109,7 @@ def _bodies(hand: Hand) -> dict[int, _Body]:
 
 def _visual_shapes(hand: Hand) -> list[Shape]:
     known = ("kind", "sizes", "points", "triangles", "name", "link", "joint", "parent_joint", "placement")
-    tables = _core.read_visual_shapes(hand.tree, hand.urdf, list(hand.package_dirs))
+    tables = _core.read_visual_shapes(hand.tree, hand.urdf, list(mesh_folders(hand)))
     return [Shape(**{name: table[name] for name in known}) for table in tables]
 
 
@@ -142,9 +143,9 @@ def _fingertip(closing: Closing, body: _Body, number: int) -> Pad:
     """The pad at the front of a link where its finger closes; where that is an edge, where its last joint alone does."""
     best: _Place | None = None
     for last in (False, True):
-        point = _end(body)
+        point, direction = _end(body), np.zeros(3)
         for _ in range(ROUNDS):
-            direction = closing.direction(number, point, last=last)
+            direction = closing.direction(number, _beneath(body, point, direction), last=last)
             point = _front(body, direction)
         place = _dome(closing, body, number, point, direction)
         if place is not None and (best is None or place.dome.half > best.dome.half):
@@ -183,6 +184,12 @@ def _front(body: _Body, direction: Array) -> Array:
     x, y = np.meshgrid(xs, ys, indexing="ij")
     center = [float((near * grid).sum() / near.sum()) for grid in (x, y)]
     return np.asarray(T[:3, :3] @ [*center, np.nanmax(heights)] + T[:3, 3])
+
+
+def _beneath(body: _Body, point: Array, direction: Array) -> Array:
+    """The point below one of the surface (3,), halfway through the body: it moves as the link does, and does not roll."""
+    along = body.corners @ direction
+    return np.asarray(point - (point @ direction - 0.5 * (along.min() + along.max())) * direction)
 
 
 def _window(body: _Body, direction: Array) -> tuple[Array, Array, Array, float]:
