@@ -47,6 +47,8 @@ if typing.TYPE_CHECKING:
     from graspatlas.optimizer.ladder_outcome import Ladder
     from graspatlas.optimizer.optimize import optimize
     from graspatlas.optimizer.rungs import Rung
+    from graspatlas.pads.find import find_pads
+    from graspatlas.pads.pad import Pad
     from graspatlas.paths.path import GraspPath, Path
     from graspatlas.paths.shortest_path import shortest_path
     from graspatlas.problem.contacts import Contact
@@ -105,6 +107,7 @@ __all__ = [
     "HoldingForce",
     "JointMargin",
     "Ladder",
+    "Pad",
     "Path",
     "Peak",
     "PoseGuess",
@@ -130,6 +133,7 @@ __all__ = [
     "export_html",
     "find_components",
     "find_grasps",
+    "find_pads",
     "ladder",
     "load_problem",
     "load_result",
@@ -189,6 +193,8 @@ _HOMES: dict[str, tuple[str, ...]] = {
     "optimizer.ladder_outcome": ("Ladder",),
     "optimizer.optimize": ("optimize",),
     "optimizer.rungs": ("Rung",),
+    "pads.find": ("find_pads",),
+    "pads.pad": ("Pad",),
     "paths.path": ("GraspPath", "Path"),
     "paths.shortest_path": ("shortest_path",),
     "problem.contacts": ("Contact",),

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 from graspatlas.collision.shapes import Shape, convex_solid, read_shapes
 from graspatlas.errors import GraspAtlasError
+from graspatlas.hand.embedded_meshes import mesh_folders
 from graspatlas.hand.mesh_files import check_meshes
 from graspatlas.hand.urdf import fixed_parents
 
@@ -69,7 +70,7 @@ def _shapes(body: Body, tree: str) -> tuple[Shape, ...]:
     """Collision shapes of a body, convex meshes as solids."""
     check_meshes(body)
     try:
-        shapes = read_shapes(tree, body.urdf, body.package_dirs)
+        shapes = read_shapes(tree, body.urdf, mesh_folders(body))
     except GraspAtlasError as error:
         reason = " ".join(str(error).split())
         raise GraspAtlasError(f"collision shapes of '{body.name}' cannot be read: {reason}") from None

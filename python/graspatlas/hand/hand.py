@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,6 +14,7 @@ from graspatlas import _core
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.body import Body
 from graspatlas.hand.mechanism import Mechanism
+from graspatlas.hand.robot_files import find_file, package_folders
 from graspatlas.hand.urdf import (
     effort_limits,
     joint_limits,
@@ -23,6 +25,7 @@ from graspatlas.hand.urdf import (
     with_followers_limited,
 )
 from graspatlas.hand.urdf_checks import LARGEST
+from graspatlas.storage.files import read_text
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import PlainTable, StatedTable, checked_table, numbers, read_only
 
@@ -70,6 +73,53 @@ class Hand(Body):
         """Read a hand from a URDF file; see :meth:`Body.from_urdf`."""
         read = cls._read(urdf, name, srdf, folder, package_paths)
         return cls(**read, limits=dict(limits or {}))
+
+    @classmethod
+    def from_mjcf(
+        cls,
+        mjcf: str | Path,
+        *,
+        root: str | None = None,
+        name: str | None = None,
+        srdf: str | Path | None = None,
+        folder: Path | None = None,
+        limits: dict[str, tuple[float, float]] | None = None,
+    ) -> Hand:
+        """Read a hand from an MJCF file, by MuJoCo; it then stands in :attr:`urdf` and needs MuJoCo no more.
+
+        Bodies become links, hinges and slides joints, linear couplings of two joints mimics, and sites frames. Geoms
+        that take part in contacts become collision shapes, those of the groups 0 to 2 visual ones. What is left out is
+        said by a ``RuntimeWarning``, a line each.
+
+        Args:
+            mjcf: Path of the file; a relative one is looked up in `folder`, then in the robots of the package.
+            root: The body that is the palm; what is not below it is left out, and with it the joints that move it, such
+                as those of a wrist. By default the last body before the fingers part.
+            name: Name to give the hand; the file's by default.
+            srdf: Path of an SRDF file with pairs of links that may touch. Without it they are those that the MJCF
+                excludes, neighbours, and links that overlap in whatever posture.
+            folder: Where relative paths start; the current folder by default.
+            limits: Joint limits that replace those of the file [rad or m].
+
+        Raises:
+            GraspAtlasError: If MuJoCo is not installed, a file is missing or cannot be read, or the hand has something
+                that it cannot have: a ball joint, a coupling that is not linear, no joint.
+        """
+        from graspatlas.hand.mjcf.convert import convert_mjcf  # needs MuJoCo's help
+
+        path = find_file(mjcf, folder)
+        found = convert_mjcf(path, root)
+        for note in found.notes:
+            warnings.warn(f"'{mjcf}': {note}", RuntimeWarning, stacklevel=2)
+        pairs = read_text(find_file(srdf, folder)) if srdf else found.srdf
+        return cls(
+            name=name or path.stem,
+            urdf=found.urdf,
+            urdf_path=str(mjcf),
+            package_dirs=package_folders(path),
+            srdf=pairs,
+            limits=dict(limits or {}),
+        )
 
     def with_joints(self, moving: Sequence[str] | None = None, locked: Mapping[str, float] | None = None) -> Hand:
         """The hand with only some joints moving, the others locked.
@@ -122,9 +172,12 @@ class Hand(Body):
     @classmethod
     def from_dict(cls, data: StatedTable, folder: Path | None = None) -> Hand:
         """The hand that a problem file or :meth:`to_dict` describes; see :meth:`Body.from_dict`."""
-        table = dict(checked_table(data, "a hand", ("urdf",), None))
+        table = dict(checked_table(data, "a hand", (), None))
         stated = checked_table(table.pop("limits", None) or {}, "limits", (), None)
         limits = {name: _limits_of(name, pair) for name, pair in stated.items()}
+        if "mjcf" in table:
+            table = dict(checked_table(table, "a hand", ("mjcf",), ("name", "root", "srdf")))
+            return cls.from_mjcf(**table, folder=folder, limits=limits)
         return cls(**cls._arguments(table, folder), limits=limits)
 
     @cached_property

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from graspatlas.errors import GraspAtlasError
+from graspatlas.hand.embedded_meshes import mesh_folders
 from graspatlas.hand.robot_files import PACKAGE
 from graspatlas.hand.urdf_checks import LARGEST
 from graspatlas.storage.files import is_file, read_text
@@ -17,7 +18,7 @@ from graspatlas.support.arrays import Array
 if TYPE_CHECKING:
     from graspatlas.hand.body import Body
 
-__all__ = ["check_meshes"]
+__all__ = ["check_meshes", "mesh_corners"]
 
 #: Before the triangles of a binary STL file: a header, and their number [bytes].
 _STL_HEADER = 84
@@ -34,8 +35,9 @@ def check_meshes(body: Body) -> None:
     Raises:
         GraspAtlasError: If one holds a number that is not finite, or nothing but a point or a line.
     """
+    folders = mesh_folders(body)
     for name in sorted({str(mesh.get("filename")) for mesh in ElementTree.fromstring(body.urdf).iter("mesh")}):
-        path = _path(name, body.package_dirs)
+        path = _path(name, folders)
         if path is not None:
             _check(body.name, path)
 
@@ -51,7 +53,7 @@ def _path(name: str, folders: tuple[str, ...]) -> Path | None:
 
 def _check(body: str, path: Path) -> None:
     try:
-        corners = _corners(path)
+        corners = mesh_corners(path)
     except (OSError, ValueError) as error:
         raise GraspAtlasError(f"mesh '{path}' of '{body}' cannot be read: {error}") from None
     if corners is None:
@@ -69,7 +71,7 @@ def _check(body: str, path: Path) -> None:
         raise GraspAtlasError(f"mesh '{path}' of '{body}' has no area: its corners lie in one point or line")
 
 
-def _corners(path: Path) -> Array | None:
+def mesh_corners(path: Path) -> Array | None:
     """Corners of the triangles of a mesh (n, 3), in its own unit; None where the format is not known here."""
     kind = path.suffix.lower()
     if kind == ".stl":

@@ -152,6 +152,9 @@ class _Reading:
         plain = table.model_dump(
             include={"name", "urdf", "srdf", "urdf_text", "srdf_text", "package_paths", "limits"}, exclude_none=True
         )
+        if table.mjcf is not None:
+            given = {"mjcf": table.mjcf, "root": table.root, "name": table.name, "srdf": table.srdf}
+            return Hand.from_dict({**given, "limits": table.limits}, self.folder)
         if table.example_robot_data is not None:
             with self._within("hand", "example_robot_data"):
                 plain["urdf"] = example_robot(table.example_robot_data)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal, Union, get_type_hints
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
+from pydantic_core import PydanticCustomError
 
 from graspatlas.patches.base import Patch
 from graspatlas.patches.registry import patch_types
@@ -22,7 +23,7 @@ Quaternion = Annotated[list[Finite], Field(min_length=4, max_length=4)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 Postures = dict[str, Finite]
 
-HAND_SOURCES = ("urdf", "example_robot_data", "robot_descriptions")
+HAND_SOURCES = ("urdf", "mjcf", "example_robot_data", "robot_descriptions")
 OBJECT_SOURCES = ("urdf", "mesh", "sphere", "box", "cylinder")
 
 
@@ -44,6 +45,14 @@ class BodyTable(Table):
 class HandTable(BodyTable):
     """The hand. The root of its URDF is the palm, and the world."""
 
+    mjcf: str | None = Field(
+        None, description="Path of an MJCF file, absolute or relative to this file; needs graspatlas[mujoco]."
+    )
+    root: str | None = Field(
+        None,
+        description="The body of the MJCF that is the palm; by default the last one before the fingers part. What is not "
+        "below it is left out.",
+    )
     example_robot_data: str | None = Field(
         None, description="Name of a URDF in example-robot-data, such as allegro_right_hand."
     )
@@ -67,6 +76,9 @@ class HandTable(BodyTable):
     @model_validator(mode="after")
     def _one_source(self) -> HandTable:
         exactly_one(self, HAND_SOURCES, "the hand")
+        if self.root is not None and self.mjcf is None:
+            message = "root names the palm of an MJCF; a URDF has its own root: lock joints instead"
+            raise PydanticCustomError("root_of_urdf", "{message}", {"message": message})
         return self
 
 

@@ -16,7 +16,7 @@ from graspatlas.reproduce.runs import Setting, run
 from graspatlas.requirements.collision_free import CollisionFree
 from graspatlas.requirements.screening import screen
 from graspatlas.result.result import Result
-from graspatlas.simulation.mujoco_library import mujoco_library
+from graspatlas.support.mujoco_library import mujoco_library
 from graspatlas.simulation.outcome import Simulation
 from graspatlas.simulation.protocols import PROTOCOLS
 from graspatlas.simulation.recording import record

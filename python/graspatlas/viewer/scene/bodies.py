@@ -9,6 +9,7 @@ from typing import Any
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.body import Body
+from graspatlas.hand.embedded_meshes import mesh_folders
 from graspatlas.hand.mesh_files import check_meshes
 from graspatlas.problem.problem import Problem
 from graspatlas.support.arrays import Array
@@ -62,7 +63,7 @@ class BodyShapes:
         """The meshes of a body; its collision shapes where it has no visual ones."""
         check_meshes(body)
         try:
-            tables = _core.read_visual_shapes(body.tree, body.urdf, list(body.package_dirs))
+            tables = _core.read_visual_shapes(body.tree, body.urdf, list(mesh_folders(body)))
         except GraspAtlasError as error:
             raise GraspAtlasError(
                 f"cannot show '{body.name}' ({body.urdf_path or 'URDF text'}): {' '.join(str(error).split())} "

@@ -1,0 +1,1 @@
+"""Hands in MJCF, by way of the URDF that says the same."""
