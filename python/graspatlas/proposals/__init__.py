@@ -1,0 +1,6 @@
+"""Grasps of any hand and any mesh: which fingers touch which regions, and the best grasp of each such assignment."""
+
+#from graspatlas.proposals.outcome import Proposal, Proposals
+#from graspatlas.proposals.propose import propose
+
+__all__: list[str] = []
