@@ -17,7 +17,9 @@ def icosahedron() -> tuple[np.ndarray, np.ndarray]:
     gaps = np.linalg.norm(corners[:, None] - corners[None], axis=2)
     edge = np.sort(gaps, axis=1)[0, 1]
     near = np.abs(gaps - edge) < 1e-9
-    triples = [(i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[i, k]]
+    triples = [
+        (i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[i, k]
+    ]
     turned = [
         (i, j, k) if np.dot(np.cross(corners[j] - corners[i], corners[k] - corners[i]), corners[i]) > 0.0 else (i, k, j)
         for i, j, k in triples

@@ -22,9 +22,10 @@ def add_commands(commands: Subcommands) -> None:
     """Add new, check and schema to the subcommands of a parser."""
     new = commands.add_parser("new", help="write a commented problem file for a hand, to be filled in")
     new.add_argument(
-        "urdf",
-        help="URDF of the hand; or example_robot_data:NAME, or robot_descriptions:NAME",
+        "hand",
+        help="URDF or MJCF of the hand; or example_robot_data:NAME, robot_descriptions:NAME, or a name among these",
     )
+    new.add_argument("--root", metavar="BODY", help="body of an MJCF that is the palm")
     new.add_argument("--object", metavar="FILE", help="URDF or mesh of the object")
     new.add_argument("--output", type=path_word, metavar="FILE", help="file to write; standard output by default")
     new.set_defaults(run=_new)
@@ -48,7 +49,7 @@ def _new(options: argparse.Namespace) -> int:
     from graspatlas.problem_files.template import problem_template  # slow to import
 
     folder = options.output.parent if options.output else Path()
-    text = problem_template(options.urdf, options.object, folder=folder)
+    text = problem_template(options.hand, options.object, folder=folder, root=options.root)
     _write(text, options.output, keep=True)
     return 0
 

@@ -12,7 +12,16 @@ from pathlib import Path
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.storage.files import is_file
 
-__all__ = ["described_robot", "example_robot", "find_file", "package_folders", "robots_folder"]
+__all__ = [
+    "bundled_hands",
+    "described_names",
+    "described_robot",
+    "example_names",
+    "example_robot",
+    "find_file",
+    "package_folders",
+    "robots_folder",
+]
 
 PACKAGE = "package://"
 
@@ -76,6 +85,29 @@ def find_file(path: str | Path, folder: Path | None, stated: tuple[str, ...] = (
     raise GraspAtlasError(f"file '{path}' does not exist; looked for it at {looked}")
 
 
+def bundled_hands() -> dict[str, str]:
+    """The hands that come with the package: paths of their URDFs among its robots, by name."""
+    folder = robots_folder()
+    urdfs = sorted(folder.glob("*/*.urdf"))
+    return {path.stem: path.relative_to(folder).as_posix() for path in urdfs if path.stem == path.parent.name}
+
+
+def example_names() -> tuple[str, ...]:
+    """Names of the URDFs in example-robot-data; none where that is not installed."""
+    share = _example_share()
+    return () if share is None else tuple(_example_urdfs(share))
+
+
+def described_names() -> tuple[str, ...]:
+    """Names of the robots in robot_descriptions; none where that is not installed."""
+    try:
+        listing = importlib.import_module("robot_descriptions")
+    except ImportError:
+        return ()
+    modules = pkgutil.iter_modules(listing.__path__)
+    return tuple(module.name for module in modules if module.name.endswith("_description"))
+
+
 def example_robot(name: str) -> str:
     """The ``package://`` path of a URDF in example-robot-data.
 
@@ -101,22 +133,19 @@ REASON = 200
 
 
 def described_robot(name: str) -> tuple[str, tuple[str, ...]]:
-    """The URDF of a robot of robot_descriptions, which fetches it on first use, and its package folders.
+    """The URDF or MJCF of a robot of robot_descriptions, which fetches it on first use, and its package folders.
 
     Args:
         name: Such as ``"allegro_hand_description"``.
 
     Raises:
-        GraspAtlasError: If robot_descriptions is not installed, has no such URDF or cannot fetch it.
+        GraspAtlasError: If robot_descriptions is not installed, has no such robot or cannot fetch it.
     """
-    try:
-        listing = importlib.import_module("robot_descriptions")
-    except ImportError:
-        raise GraspAtlasError("robot_descriptions is not installed: pip install graspatlas[hands]") from None
-    names = [module.name for module in pkgutil.iter_modules(listing.__path__) if module.name.endswith("_description")]
-    names = [known for known in names if not known.endswith("_mj_description")]
+    names = described_names()
+    if not names:
+        raise GraspAtlasError("robot_descriptions is not installed: pip install graspatlas[hands]")
     if name not in names:
-        raise unknown_name("robot", name, names, "a URDF in robot_descriptions")
+        raise unknown_name("robot", name, names, "in robot_descriptions")
     try:
         module = importlib.import_module(f"robot_descriptions.{name}")
     except Exception as error:  # git, network and file errors of many kinds
@@ -124,10 +153,11 @@ def described_robot(name: str) -> tuple[str, tuple[str, ...]]:
             f"robot_descriptions cannot fetch '{name}': {_last_words(error)}; it clones a repository on first "
             "use: try again with a connection, or give the path of a URDF instead"
         ) from None
-    if not hasattr(module, "URDF_PATH"):
-        raise GraspAtlasError(f"'{name}' of robot_descriptions has no URDF")
+    path = getattr(module, "URDF_PATH", None) or getattr(module, "MJCF_PATH", None)
+    if path is None:
+        raise GraspAtlasError(f"'{name}' of robot_descriptions has neither URDF nor MJCF")
     package = Path(module.PACKAGE_PATH)
-    return str(module.URDF_PATH), tuple(map(str, dict.fromkeys((package.parent, package, module.REPOSITORY_PATH))))
+    return str(path), tuple(map(str, dict.fromkeys((package.parent, package, module.REPOSITORY_PATH))))
 
 
 def _last_words(error: Exception) -> str:

@@ -1,16 +1,16 @@
 """How the links of a hand move when it closes: which joints flex, to which side, and where that takes a link.
 
 A finger is the chain of joints from the palm to a link. Its flexors are the joints whose axes are parallel to that of
-its last one, or nearly; they close to the side on which its end comes nearer to where the finger begins and to the other
-fingers. Where they flex at the same rate, in the middle of their ranges, the velocity of the pad is the direction in
-which the link closes.
+its last one, or nearly; they close to the side on which its end comes nearer to where the finger begins and to the
+other fingers. Where they flex at the same rate, from a little before the middle of their ranges on, the velocity of a
+link is the direction in which it closes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from xml.etree import ElementTree
 
 import numpy as np
@@ -25,8 +25,8 @@ __all__ = ["Closing", "Joint"]
 PARALLEL = 0.7
 #: How far a joint without limits counts as turning to either side [rad].
 QUARTER = 0.5 * np.pi
-#: A rate of a joint below this share of the fastest is none.
-STILL = 1e-9
+#: Where in their ranges the flexors are about to close round something, 0 being where they start.
+FLEXED = 0.4
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Closing:
 
     Args:
         hand: The hand.
-        ends: Where links end, away from the joints that carry them, in the joints' frames (3,) by their numbers, metres.
+        ends: Where links end, in the frames of the joints that carry them (3,), metres, by the joints' numbers.
     """
 
     def __init__(self, hand: Hand, ends: Mapping[int, Array]) -> None:
@@ -80,8 +80,12 @@ class Closing:
     @cached_property
     def middle(self) -> dict[str, float]:
         """Positions of all joints in the middle of their ranges, those that mimic others where these have them."""
-        positions = {name: 0.5 * (low + high) for name, (low, high) in self._ranges.items()}
-        return self._followed(positions)
+        return self._followed({name: 0.5 * (low + high) for name, (low, high) in self._ranges.items()})
+
+    @cache  # noqa: B019  (lives as long as one search for pads)
+    def about_to_close(self, number: int) -> dict[str, float]:
+        """The middle posture with the flexors of a finger at :data:`FLEXED` of their ranges."""
+        return self._followed({**self.middle, **self._flexed(self.rates(number), FLEXED)})
 
     def placement(self, number: int, positions: Mapping[str, float]) -> Array:
         """T_palm_joint (4, 4) at a posture."""
@@ -105,20 +109,20 @@ class Closing:
             point: The point in the joint's frame (3,), metres.
             last: Whether that joint moves alone.
         """
-        rates = self.rates(number)
-        T = self.placement(number, self.middle)
+        rates, posture = self.rates(number), self.about_to_close(number)
+        T = self.placement(number, posture)
         at = T[:3, :3] @ point + T[:3, 3]
         velocity = np.zeros(3)
         for joint in self.chain(number)[-1:] if last else self.chain(number):
             if rate := rates.get(joint.name, 0.0):
-                velocity += rate * self._velocity(joint, at)
+                velocity += rate * self._velocity(joint, at, posture)
         turned = T[:3, :3].T @ velocity
         length = float(np.linalg.norm(turned))
         return turned / length if length > 0.0 else np.zeros(3)
 
-    def _velocity(self, joint: Joint, point: Array) -> Array:
-        """Velocity of a point of the palm's frame (3,) when a joint moves at the unit rate, at the middle posture."""
-        T = self.placement(joint.number, self.middle)
+    def _velocity(self, joint: Joint, point: Array, posture: Mapping[str, float]) -> Array:
+        """Velocity of a point of the palm's frame (3,) when a joint moves at the unit rate, at a posture."""
+        T = self.placement(joint.number, posture)
         axis = T[:3, :3] @ np.array(joint.axis)
         return axis if joint.slides else np.cross(axis, point - T[:3, 3])
 
@@ -151,20 +155,24 @@ class Closing:
 
     def _end(self, number: int, rates: Mapping[str, float], side: float) -> float:
         """Distance of a finger's end from its beginning and from the other fingers, with its flexors at one end [m]."""
-        positions = dict(self.middle)
-        followers = self.hand.mechanism.followers
-        drivers = {followers[name].driver if name in followers else name: name for name in rates}
-        for driver, name in drivers.items():
-            low, high = self._ranges[driver]
-            rate = rates[name] * (followers[name].multiplier if name in followers else 1.0)
-            positions[driver] = high if side * rate > 0.0 else low
-        placements = self._placements(self._followed(positions))
+        flexed = self._flexed(rates, 0.5 * (1.0 + side))
+        placements = self._placements(self._followed({**self.middle, **flexed}))
         rest = self._placements(self.middle)
         chain = self.chain(number)
         end = _at(placements[chain[-1].link], self._reach(number))
         others = [_at(rest[self.joints[n].link], self._reach(n)) for n in self.fingertips if n != number]
         goals = [placements[chain[0].link][:3, 3], *([np.mean(others, axis=0)] if others else [])]
         return float(sum(np.linalg.norm(end - goal) for goal in goals))
+
+    def _flexed(self, rates: Mapping[str, float], share: float) -> dict[str, float]:
+        """Positions of what drives joints that move at some rates, at a share of their ranges, 0 where they start."""
+        followers, positions = self.hand.mechanism.followers, {}
+        for name, rate in rates.items():
+            mimic = followers.get(name)
+            driver, towards = (name, rate) if mimic is None else (mimic.driver, rate * mimic.multiplier)
+            low, high = self._ranges[driver]
+            positions[driver] = low + (share if towards > 0.0 else 1.0 - share) * (high - low)
+        return positions
 
     def _reach(self, number: int) -> Array:
         """Where a joint's link ends, in the joint's frame (3,), metres."""

@@ -29,7 +29,7 @@ WIDE_ENOUGH = 0.5
 #: A surface that bends less than this over its square is flat, as a share of the square's half side.
 FLAT = 1e-3
 #: Control points of a spline along u and v, and its degree.
-NET, DEGREE = 7, 3
+NET, DEGREE = 9, 3
 #: The normal is that of the rays within so many of the middle one.
 NEAR = 5
 #: How often the normal is found anew, looking along the one before.

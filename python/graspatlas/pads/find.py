@@ -11,8 +11,8 @@ import numpy as np
 from graspatlas import _core
 from graspatlas.collision.shapes import Shape, read_shapes
 from graspatlas.errors import GraspAtlasError, unknown_name
-from graspatlas.hand.hand import Hand
 from graspatlas.hand.embedded_meshes import mesh_folders
+from graspatlas.hand.hand import Hand
 from graspatlas.hand.mesh_files import check_meshes
 from graspatlas.pads.closing import Closing
 from graspatlas.pads.dome import fit_dome
@@ -38,9 +38,15 @@ ROUNDS = 3
 
 @dataclass(frozen=True, eq=False)
 class _Body:
-    """What one joint carries, or the palm: shapes in the joint's frame."""
+    """What one joint carries, or the palm.
+
+    Attributes:
+        shapes: Its shapes, in the joint's frame.
+        frame: The link in whose coordinates its pad is wanted; by default the one that the pad lies on.
+    """
 
     shapes: tuple[Shape, ...]
+    frame: str = ""
 
     @cached_property
     def width(self) -> float:
@@ -66,12 +72,14 @@ def find_pads(hand: Hand, links: Sequence[str] | None = None) -> tuple[Pad, ...]
 
     The direction in which a link closes follows from the kinematics: joints with axes parallel to that of its finger's
     last one flex, to the side on which the finger's end comes nearer to its beginning and to the other fingers. The
-    pad's middle is where a plate that the link closes against would touch its collision shape first, or its visual shape
-    where it has no other. The palm's lies on the way from between the fingertips to its middle.
+    middle of a fingertip's pad is where a plate that it closes against would touch its collision shape first, or its
+    visual shape where it has no other; that of a phalanx is in the middle of the side to which it closes, and the
+    palm's on the way from between the fingertips to its middle.
 
     Args:
         hand: The hand.
-        links: Names of the links to look at; by default the fingertips, the links whose joints move no other.
+        links: Names of the links to look at, palm and phalanges too; by default the fingertips, the links whose joints
+            move no other. A link without a shape, such as a mere frame, stands for all that its joint carries.
 
     Returns:
         The pads, in the order of the links or of the hand's joints.
@@ -127,7 +135,7 @@ def _pad_of(hand: Hand, closing: Closing, bodies: dict[int, _Body], link: str) -
     if body is None:
         raise unknown_name("link", link, _links(bodies), f"one with a shape in hand '{hand.name}'")
     own = tuple(shape for shape in body.shapes if shape.link == link)
-    body = _Body(own) if own else body
+    body = _Body(own or body.shapes, link)
     if number == 0:
         return _palm(closing, body, {n: _end(b) for n, b in bodies.items()})
     if number in closing.fingertips:
@@ -140,7 +148,7 @@ def _links(bodies: dict[int, _Body]) -> list[str]:
 
 
 def _fingertip(closing: Closing, body: _Body, number: int) -> Pad:
-    """The pad at the front of a link where its finger closes; where that is an edge, where its last joint alone does."""
+    """The pad at the front of a link where its finger closes, or where its last joint does if that is an edge."""
     best: _Place | None = None
     for last in (False, True):
         point, direction = _end(body), np.zeros(3)
@@ -187,7 +195,7 @@ def _front(body: _Body, direction: Array) -> Array:
 
 
 def _beneath(body: _Body, point: Array, direction: Array) -> Array:
-    """The point below one of the surface (3,), halfway through the body: it moves as the link does, and does not roll."""
+    """The point below one of the surface (3,), halfway through the body, which moves but does not roll."""
     along = body.corners @ direction
     return np.asarray(point - (point @ direction - 0.5 * (along.min() + along.max())) * direction)
 
@@ -211,11 +219,13 @@ def _dome(closing: Closing, body: _Body, number: int, point: Array, direction: A
     """The patch round a point of a body, in the coordinates of the link that is met there; None where none fits."""
     if not direction.any():
         return None
-    link = _link_at(body, point, direction)
+    link = body.frame or _link_at(body, point, direction)
     _, T = closing.hand.frame(link)
     to_link = np.linalg.inv(T)
     joint, size = closing.joints.get(number), np.ptp(body.corners, axis=0)
-    along = np.cross(np.array(joint.axis), direction) if joint and not joint.slides else np.eye(3)[np.argmax(size)]
+    along = np.eye(3)[np.argmax(size)]
+    if joint is not None and not joint.slides:
+        along = np.cross(np.array(joint.axis), direction)
     shapes = [replace(shape, placement=to_link @ shape.placement) for shape in body.shapes]
     at, towards, u_axis = to_link[:3, :3] @ point + to_link[:3, 3], to_link[:3, :3] @ direction, to_link[:3, :3] @ along
     dome = fit_dome(shapes, at, towards, u_axis, LARGEST * body.width)
@@ -237,8 +247,8 @@ def _pad(closing: Closing, body: _Body, place: _Place | None) -> Pad:
     """The pad of a patch."""
     if place is None:
         raise GraspAtlasError(
-            f"link '{body.shapes[0].link}' of hand '{closing.hand.name}' has no smooth place where it closes: its shape "
-            "has an edge or a hole there, or no joint moves it; state its patch by hand"
+            f"link '{body.shapes[0].link}' of hand '{closing.hand.name}' has no smooth place where it closes: its "
+            "shape has an edge or a hole there, or no joint moves it; state its patch by hand"
         )
     patch, error = place.dome.patch, place.dome.error
     (x, y, z), (a, b, c) = map(float, patch.point()), map(float, patch.normal_at())

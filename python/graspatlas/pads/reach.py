@@ -95,7 +95,7 @@ class _Surroundings:
             place: That value.
             across: Interval of the other parameter.
         """
-        others = np.linspace(*across, POINTS)
+        others = np.linspace(across[0], across[1], POINTS)
         tables = [self._core.evaluate(*((place, other) if name == "u" else (other, place))) for other in others]
         points = (np.array([table["o"] for table in tables]) - self._T[:3, 3]) @ self._T[:3, :3]
         upright = np.array([table["m"] for table in tables]) @ self._T[:3, 2]

@@ -38,7 +38,8 @@ def look(shapes: Sequence[Shape], T: Array, xs: Array, ys: Array) -> View:
     Args:
         shapes: Shapes, placed in the body.
         T: The frame in the body (4, 4).
-        xs, ys: Evenly spaced places of the rays along its x and y axis (n,) each, metres.
+        xs: Evenly spaced places of the rays along its x axis (n,), metres.
+        ys: Along its y axis (m,).
     """
     heights = np.full((len(xs), len(ys)), -np.inf)
     seen = np.full(heights.shape, -1)
@@ -137,7 +138,7 @@ def _capsule(shape: Shape, T: Array, xs: Array, ys: Array) -> Array:
     radius, half = float(shape.sizes[0]), 0.5 * float(shape.sizes[1])
     origins, up = _rays(T, xs, ys)
     ends = [_ball(origins, up, radius, center) for center in (-half, half)]
-    return np.max([_cylinder(shape, T, xs, ys), *ends], axis=0)
+    return np.asarray(np.max([_cylinder(shape, T, xs, ys), *ends], axis=0))
 
 
 def _box(shape: Shape, T: Array, xs: Array, ys: Array) -> Array:

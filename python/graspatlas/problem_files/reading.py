@@ -14,6 +14,7 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.body import Body
 from graspatlas.hand.hand import Hand
 from graspatlas.hand.motions import HandMotions, coupling_rows
+from graspatlas.hand.named_hands import is_mjcf
 from graspatlas.hand.robot_files import described_robot, example_robot, find_file
 from graspatlas.hand.urdf import mesh_urdf, moving_joints
 from graspatlas.patches.registry import patch_from_dict
@@ -153,16 +154,24 @@ class _Reading:
             include={"name", "urdf", "srdf", "urdf_text", "srdf_text", "package_paths", "limits"}, exclude_none=True
         )
         if table.mjcf is not None:
-            given = {"mjcf": table.mjcf, "root": table.root, "name": table.name, "srdf": table.srdf}
-            return Hand.from_dict({**given, "limits": table.limits}, self.folder)
+            return self._from_mjcf(table.mjcf, table)
         if table.example_robot_data is not None:
             with self._within("hand", "example_robot_data"):
                 plain["urdf"] = example_robot(table.example_robot_data)
         if table.robot_descriptions is not None:
             with self._within("hand", "robot_descriptions"):
-                plain["urdf"], folders = described_robot(table.robot_descriptions)
-            plain["package_paths"] = [*folders, *table.package_paths]
+                path, folders = described_robot(table.robot_descriptions)
+            if is_mjcf(path):
+                return self._from_mjcf(path, table)
+            plain |= {"urdf": path, "package_paths": [*folders, *table.package_paths]}
         return Hand.from_dict(plain, self.folder)
+
+    def _from_mjcf(self, path: str, table: HandTable) -> Hand:
+        for field in ("package_paths", "urdf_text", "srdf_text"):
+            if getattr(table, field):
+                raise GraspAtlasError(f"{field} is for hands in URDF; leave it out")
+        given = {"mjcf": path, "root": table.root, "name": table.name, "srdf": table.srdf}
+        return Hand.from_dict({**given, "limits": table.limits}, self.folder)
 
     def _object(self, table: ObjectTable) -> Body:
         name = table.name

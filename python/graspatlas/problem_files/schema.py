@@ -50,8 +50,8 @@ class HandTable(BodyTable):
     )
     root: str | None = Field(
         None,
-        description="The body of the MJCF that is the palm; by default the last one before the fingers part. What is not "
-        "below it is left out.",
+        description="Body of the MJCF that is the palm, and what it carries the hand; by default the last one "
+        "before the fingers part.",
     )
     example_robot_data: str | None = Field(
         None, description="Name of a URDF in example-robot-data, such as allegro_right_hand."
@@ -76,8 +76,8 @@ class HandTable(BodyTable):
     @model_validator(mode="after")
     def _one_source(self) -> HandTable:
         exactly_one(self, HAND_SOURCES, "the hand")
-        if self.root is not None and self.mjcf is None:
-            message = "root names the palm of an MJCF; a URDF has its own root: lock joints instead"
+        if self.root is not None and self.mjcf is None and self.robot_descriptions is None:
+            message = "root names the palm of an MJCF; a URDF has its own: lock joints instead"
             raise PydanticCustomError("root_of_urdf", "{message}", {"message": message})
         return self
 

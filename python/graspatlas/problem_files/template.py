@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.hand import Hand
-from graspatlas.hand.robot_files import described_robot, example_robot, find_file
+from graspatlas.hand.named_hands import named_hand
+from graspatlas.hand.robot_files import find_file, robots_folder
 from graspatlas.patches.registry import patch_types
 from graspatlas.problem_files.reading import FILL_IN
-from graspatlas.storage.files import is_file
 
 __all__ = ["problem_template"]
 
@@ -83,30 +82,34 @@ requirements:
 """
 
 
-def problem_template(urdf: str, object_file: str | None = None, *, folder: Path | None = None) -> str:
+def problem_template(
+    hand: str, object_file: str | None = None, *, folder: Path | None = None, root: str | None = None
+) -> str:
     """Text of a problem file for a hand, with joints and frames listed and ``FILL_IN`` where the user must decide.
 
     Args:
-        urdf: Path of the hand's URDF, or ``example_robot_data:NAME`` or ``robot_descriptions:NAME``.
+        hand: Path of the hand's URDF or MJCF, ``example_robot_data:NAME``, ``robot_descriptions:NAME``, or a name among
+            these and the hands of the package.
         object_file: Path of a URDF or a mesh of the object.
         folder: Where the file will be, so that paths are stated relative to it.
+        root: The body of an MJCF that is the palm.
 
     Raises:
         GraspAtlasError: If the hand cannot be read.
     """
-    hand, source = _hand(urdf, folder)
-    joints = list(hand.mechanism.actuated)
+    whole, source = _hand(hand, folder, root)
+    joints = list(whole.mechanism.actuated)
     head = _HEAD.format(
         blank=FILL_IN,
-        name=f"my_{hand.name}",
+        name=f"my_{whole.name}",
         source=source,
         first=joints[0],
-        joints="\n".join(_joint_lines(hand)),
-        frames="\n".join(f"  #   {line}" for line in _rows(hand.frames)),
+        joints="\n".join(_joint_lines(whole)),
+        frames="\n".join(f"  #   {line}" for line in _rows(whole.frames)),
         object=_object(object_file, folder),
         contacts="\n".join([_contact()] * 3).rstrip("\n"),
     )
-    posture = "\n".join(f"#     {name}: {value:.4g}" for name, value in _middle(hand).items())
+    posture = "\n".join(f"#     {name}: {value:.4g}" for name, value in _middle(whole).items())
     return head + _TAIL.format(first=joints[0], second=joints[-1], posture=posture)
 
 
@@ -114,23 +117,20 @@ def _contact() -> str:
     return _CONTACT.format(blank=FILL_IN, kinds=", ".join(cls.kind for cls in patch_types()))
 
 
-def _hand(urdf: str, folder: Path | None) -> tuple[Hand, str]:
-    """The hand, and the line of the file that names it."""
-    kind, _, name = urdf.partition(":")
-    if kind == "example_robot_data" and name:
-        return Hand.from_urdf(example_robot(name), name=name), f"example_robot_data: {name}"
-    if kind == "robot_descriptions" and name:
-        path, folders = described_robot(name)
-        return Hand.from_urdf(path, name=name, package_paths=folders), f"robot_descriptions: {name}"
-    if not is_file(urdf):
-        raise GraspAtlasError(
-            f"file '{urdf}' does not exist; give a URDF, example_robot_data:NAME or robot_descriptions:NAME"
-        )
-    return Hand.from_urdf(Path(urdf).resolve()), f"urdf: {_relative(urdf, folder)}"
+def _hand(word: str, folder: Path | None, root: str | None) -> tuple[Hand, str]:
+    """The hand, and the lines of the file that name it."""
+    found = named_hand(word, root)
+    stated = {
+        field: _relative(value, folder) if field in ("urdf", "mjcf") else value for field, value in found.source.items()
+    }
+    return found.hand, "\n  ".join(f"{field}: {value}" for field, value in stated.items())
 
 
 def _relative(path: str, folder: Path | None) -> str:
-    return os.path.relpath(find_file(path, Path()), folder or Path())
+    """A file relative to a folder; those of the package as they are."""
+    found = find_file(path, Path())
+    bundled = not Path(path).is_absolute() and found == robots_folder() / path
+    return path if bundled else os.path.relpath(found, folder or Path())
 
 
 def _object(path: str | None, folder: Path | None) -> str:

@@ -16,6 +16,8 @@ WIDEST_GAP = 0.21
 CELLS, PER_CELL = 24, 60
 #: A cell belongs to a region when it has this share of the samples of the cells beside it.
 FILLED = 0.5
+#: Of rectangles that have this share of the largest one's area, the one nearest to the middle and to the shape is taken.
+ABOUT_LARGEST = 0.95
 
 
 def covering(surface: Surface, points: Array) -> tuple[Interval | None, Interval | None]:
@@ -47,24 +49,15 @@ def within(
         points: Points spread evenly over the region (n, 3), about ``CELLS**2 * PER_CELL``.
         u, v: Intervals that cover it; None for the circle.
     """
-    values = surface.parameters(points)
-    columns, ends = [], []
-    for k, interval in enumerate((u, v)):
-        low, high = interval or (-np.pi, np.pi)
-        x = values[:, k]
-        if k == 0 and surface.periodic or k == 1 and surface.kind == "torus":
-            x = low + np.mod(x - low, 2.0 * np.pi)
-        columns.append(np.clip(((x - low) / (high - low) * CELLS).astype(int), 0, CELLS - 1))
-        ends.append((low, high))
-    counts = np.bincount(columns[0] * CELLS + columns[1], minlength=CELLS**2).reshape(CELLS, CELLS)
+    counts = _counts(surface, points, u, v, CELLS)
     typical = np.array([np.median(row[row > 0]) if (row > 0).any() else 1.0 for row in counts.T])
-    full = counts >= np.maximum(FILLED * typical[None, :], 1.0)
-    full &= counts >= 0.25 * np.median(counts[counts > 0])
+    full = counts >= np.maximum(FILLED * typical - np.sqrt(typical), 1.0)[None, :]
     (i0, i1), (j0, j1) = largest_rectangle(full, u is None, v is None)
     found: list[Interval | None] = []
-    for (low, high), a, b, whole in zip(ends, (i0, j0), (i1, j1), (u is None, v is None), strict=True):
+    for interval, a, b in ((u, i0, i1), (v, j0, j1)):
+        low, high = interval or (-np.pi, np.pi)
         cell = (high - low) / CELLS
-        found.append(None if whole and b - a == CELLS else (low + a * cell, low + b * cell))
+        found.append(None if interval is None and b - a == CELLS else (low + a * cell, low + b * cell))
     return found[0], found[1], float(full.mean())
 
 
@@ -73,7 +66,7 @@ def largest_rectangle(full: BoolArray, wraps_u: bool = False, wraps_v: bool = Fa
     n, m = full.shape
     tall = np.concatenate([full, full]) if wraps_u else full
     wide = np.concatenate([tall, tall], axis=1) if wraps_v else tall
-    best, found = 0, ((0, n), (0, m))
+    found = []
     for start in range(n):
         every = np.ones(wide.shape[1], bool)
         for end in range(start + 1, min(start + n, len(wide)) + 1):
@@ -82,9 +75,14 @@ def largest_rectangle(full: BoolArray, wraps_u: bool = False, wraps_v: bool = Fa
                 break
             a, b = _longest_run(every)
             b = min(b, a + m)
-            if (end - start) * (b - a) > best:
-                best, found = (end - start) * (b - a), ((start, end), (a, b))
-    return np.array(found[0]), np.array(found[1])
+            found.append((start, end, a, b))
+    sides = np.array(found or [(0, n, 0, m)])
+    areas = (sides[:, 1] - sides[:, 0]) * (sides[:, 3] - sides[:, 2])
+    large = sides[areas >= ABOUT_LARGEST * areas.max()]
+    aside = (0 if wraps_u else 1) * np.abs(large[:, :2].sum(axis=1) - n) / n + np.abs(large[:, 2:].sum(axis=1) - m) / m
+    slender = np.abs((large[:, 1] - large[:, 0]) / n - (large[:, 3] - large[:, 2]) / m)
+    best = large[np.argmin(np.round(aside + slender, 9))]
+    return best[:2], best[2:]
 
 
 def _longest_run(values: BoolArray) -> tuple[int, int]:
@@ -93,3 +91,20 @@ def _longest_run(values: BoolArray) -> tuple[int, int]:
     lengths = steps[1::2] - steps[::2]
     k = int(np.argmax(lengths))
     return int(steps[2 * k]), int(steps[2 * k + 1])
+
+
+def filled(surface: Surface, points: Array, cells: int = 10) -> float:
+    """The share of the cells of the covering rectangle that hold one of the points, about."""
+    return float((_counts(surface, points, *covering(surface, points), cells) > 0).mean())
+
+
+def _counts(surface: Surface, points: Array, u: Interval | None, v: Interval | None, cells: int) -> IntArray:
+    """How many points lie in each cell of a rectangle of u and v (cells, cells)."""
+    columns = []
+    for x, interval, angle in zip(
+        surface.parameters(points).T, (u, v), (surface.periodic, surface.kind == "torus"), strict=True
+    ):
+        low, high = interval or (-np.pi, np.pi)
+        along = np.mod(x - low, 2.0 * np.pi) if angle else x - low
+        columns.append(np.clip((along / max(high - low, 1e-300) * cells).astype(int), 0, cells - 1))
+    return np.bincount(columns[0] * cells + columns[1], minlength=cells**2).reshape(cells, cells)

@@ -10,6 +10,7 @@ import numpy as np
 
 from graspatlas.meshes.smoothing import smooth_normals
 from graspatlas.meshes.triangles import TriangleMesh
+from graspatlas.regions.covering import filled
 from graspatlas.regions.extraction import extracted
 from graspatlas.regions.fitting import STEEPEST, Samples, simplest_surface
 from graspatlas.regions.sampling import spread
@@ -26,6 +27,8 @@ NEAR, ALIKE = 1.5, np.radians(35.0)
 SMOOTHED = 0.01
 #: A part has its own tolerance where it is small: this share of the side of a square as large.
 RELATIVE_TOLERANCE = 0.05
+#: A part that bends fills this share of the rectangle of u and v around it, or it is cut again.
+FILLED = 0.4
 #: How often parts are cut again.
 DEEPEST = 6
 #: How often faces at its rim may join a part.
@@ -105,7 +108,7 @@ class Cutting:
         """The parts of a piece of surface."""
         tolerance, samples = self.tolerance_of(faces), self.samples(faces)
         surface = simplest_surface(samples, tolerance)
-        if surface is not None:
+        if surface is not None and _fills(surface, samples):
             yield self._trimmed(faces, surface, tolerance)
             return
         if deeper == 0:
@@ -117,14 +120,25 @@ class Cutting:
             taken = np.zeros(len(labels), bool)
             for group in self._groups(labels):
                 taken[group] = True
-                found = simplest_surface(self.samples(group), tolerance) or surfaces[labels[group[0]]]
-                yield self._trimmed(group, found, tolerance)
+                yield from self._fitted(group, surfaces[labels[group[0]]], tolerance, deeper)
             labels[:] = -1
             labels[faces[~taken[faces]]] = 0
         else:
             labels[faces] = self._clusters(faces, samples)
         for group in self._groups(labels):
             yield from self._cut(group, deeper - 1, whole=bool(surfaces))
+
+    def _fitted(self, faces: IntArray, surface: Surface, tolerance: float, deeper: int) -> Iterator[Part]:
+        """A part that lies on a surface, as a whole, or in parts where it fills little of its rectangle."""
+        samples = self.samples(faces)
+        found = simplest_surface(samples, tolerance) or surface
+        if _fills(found, samples):
+            yield self._trimmed(faces, found, tolerance)
+        elif deeper > 0:
+            labels = np.full(len(self.mesh.faces), -1)
+            labels[faces] = self._clusters(faces, samples)
+            for group in self._groups(labels):
+                yield from self._cut(group, deeper - 1, whole=True)
 
     def _misfit(self, faces: IntArray, surface: Surface, tolerance: float) -> Array:
         """How badly faces fit a surface (n,): infinite for those that do not."""
@@ -134,7 +148,8 @@ class Cutting:
         gaps = np.maximum(gaps[: 3 * len(faces)].reshape(-1, 3).max(axis=1), gaps[3 * len(faces) :]) / tolerance
         cosines = np.einsum("nk,nk->n", surface.normals(self.mesh.centers[faces]), self.normals[faces])
         turns = np.arccos(np.clip(cosines, -1.0, 1.0))
-        return np.where((gaps <= NEAR) & (turns <= ALIKE), gaps**2 + (turns / ALIKE * 2.0) ** 2, np.inf)
+        fit = (gaps <= NEAR) & (turns <= ALIKE) & surface.regular(self.mesh.centers[faces])
+        return np.where(fit, gaps**2 + (turns / ALIKE * 2.0) ** 2, np.inf)
 
     def _nearest(self, faces: IntArray, surfaces: list[Surface], tolerance: float) -> IntArray:
         """The surface that each face fits best; -1 for none."""
@@ -178,24 +193,26 @@ class Cutting:
         owner = np.full(len(self.mesh.faces), -1)
         for k, part in enumerate(parts):
             owner[part.faces] = k
-        i, j = np.concatenate([self.links, self.links[:, ::-1]]).T
-        tried: set[tuple[int, int]] = set()
+        pairs = np.concatenate([self.links, self.links[:, ::-1]])
         for _ in range(JOINED):
-            rim = (owner[i] >= 0) & (owner[j] < 0)
-            pairs = {(int(k), int(f)) for k, f in zip(owner[i[rim]], j[rim], strict=True)} - tried
-            tried |= pairs
-            if not pairs:
-                break
-            found = np.array(sorted(pairs))
-            for k in np.unique(found[:, 0]):
-                faces = found[found[:, 0] == k, 1]
+            pairs = pairs[owner[pairs[:, 1]] < 0]
+            ready = owner[pairs[:, 0]] >= 0
+            wanted, sought = owner[pairs[ready, 0]], pairs[ready, 1]
+            pairs = pairs[~ready]
+            for k in np.unique(wanted):
+                faces = np.unique(sought[wanted == k])
                 faces = faces[owner[faces] < 0]
-                fit = np.isfinite(self._misfit(faces, parts[k].surface, self.tolerance_of(parts[k].faces) / NEAR))
-                owner[faces[fit]] = k
+                tolerance = self.tolerance_of(parts[k].faces) / NEAR
+                owner[faces[np.isfinite(self._misfit(faces, parts[k].surface, tolerance))]] = k
         order = np.argsort(owner, kind="stable")
         ends = np.searchsorted(owner[order], np.arange(len(parts) + 1))
         grown = [Part(order[a:b], p.surface) for a, b, p in zip(ends, ends[1:], parts, strict=False)]
         return [p for p in grown if self.mesh.areas[p.faces].sum() >= self.smallest]
+
+
+def _fills(surface: Surface, samples: Samples) -> bool:
+    """Whether a part fills enough of the rectangle of u and v around it; flats do without."""
+    return surface.kind == "plane" or filled(surface, samples.points) > FILLED
 
 
 def _turn(normals: Array) -> float:

@@ -1,4 +1,4 @@
-"""Planes, cylinders, spheres and cones that a piece of surface holds beside other things."""
+"""Planes and round surfaces that a piece of surface holds beside other things."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ SEEDS, SURROUNDINGS = 20, (0.02, 0.06, 0.18)
 #: Normals of the surroundings make at most this angle with the seed's, in cosines: 70 degrees.
 FACING = 0.34
 #: Kinds of round surfaces that are tried, the simplest first.
-KINDS = ("cylinder", "sphere", "cone")
+KINDS = ("cylinder", "sphere", "cone", "torus", "revolution")
+#: How many of these are tried on the surroundings of seeds; the others on all samples.
+LOCAL = 3
 #: Candidates that are fitted well.
 SHORT_LIST = 6
 #: A surface is really there when this share of what lies within the tolerance lies within half of it.
@@ -56,9 +58,10 @@ def extracted(samples: Samples, tolerance: float, least: float) -> list[Surface]
 def _largest(samples: Samples, tolerance: float, least: float) -> tuple[Surface, BoolArray] | None:
     """The largest genuine surface among the samples, or a simpler one nearly as large, and its samples."""
     pairs = neighbours(samples)
-    rated = [(int(_inside(s, samples, tolerance).sum()), kind, s) for kind, s in _candidates(samples)]
+    rated = [(int(_inside(s, samples, tolerance).sum()), kind, s) for kind, s in _candidates(samples, tolerance)]
     rated.sort(key=lambda item: -item[0])
-    short = [item for kind in range(4) for item in [r for r in rated if r[1] == kind][:SHORT_LIST] if item[0] >= least]
+    short = [r for kind in range(len(KINDS) + 1) for r in [r for r in rated if r[1] == kind][:SHORT_LIST]]
+    short = [item for item in short if item[0] >= least]
     final = []
     for _, kind, surface in short:
         better = _settled(kind, surface, samples, pairs, tolerance)
@@ -73,7 +76,7 @@ def _largest(samples: Samples, tolerance: float, least: float) -> tuple[Surface,
     return surface, inside
 
 
-def _candidates(samples: Samples) -> list[tuple[int, Surface]]:
+def _candidates(samples: Samples, tolerance: float) -> list[tuple[int, Surface]]:
     """Surfaces of the surroundings of seeds, with the number of their kind, 0 for planes."""
     from scipy.spatial import cKDTree  # slow to import
 
@@ -89,10 +92,14 @@ def _candidates(samples: Samples) -> list[tuple[int, Surface]]:
                 continue
             part = samples[near]
             found.append((0, fitted_flat(part)))
-            for number, kind in enumerate(KINDS, 1):
+            for number, kind in enumerate(KINDS[:LOCAL], 1):
                 surface = rough_round(kind, part)
                 if surface is not None:
                     found.append((number, surface))
+    for number, kind in enumerate(KINDS[LOCAL:], LOCAL + 1):
+        surface = fitted_round(kind, samples, tolerance)
+        if surface is not None:
+            found.append((number, surface))
     return found
 
 

@@ -96,16 +96,18 @@ def region_named(regions: tuple[Region, ...], name: str) -> Region:
 
 def _region(mesh: TriangleMesh, part: Part) -> Region | None:
     """The region of a part of a mesh; None where no patch of it is regular."""
-    faces, surface = part.faces, part.surface
+    faces = part.faces
     corners, areas = mesh.corners[faces], mesh.areas[faces]
-    points, which = on_triangles(corners, areas, CELLS**2 * PER_CELL, np.random.default_rng(0))
-    u, v = covering(surface, np.concatenate([corners.reshape(-1, 3), points]))
+    points, _ = on_triangles(corners, areas, CELLS**2 * PER_CELL, np.random.default_rng(0))
+    places = np.concatenate([points, corners.reshape(-1, 3)])
+    surface = part.surface.centered(places)
+    u, v = covering(surface, places)
     inner_u, inner_v, filled = within(surface, points, u, v)
     try:
         patch, inner = _patch(surface, u, v), _patch(surface, inner_u, inner_v)
     except GraspAtlasError:
         return None
-    gaps = np.abs(surface.distances(np.concatenate([points, corners.reshape(-1, 3)])))
+    gaps = np.abs(surface.distances(places))
     return Region(
         name=("inner_" if surface.concave else "") + surface.kind,
         patch=patch,

@@ -21,10 +21,6 @@ SAME_NORMAL = np.radians(25.0)
 OUTLIERS = 2.0
 #: Normals of the graph of a spline turn from its plane's by this at most [rad]: 70 degrees.
 STEEPEST = np.radians(70.0)
-#: Slopes of an outline, radius by height, are at most this steep.
-STEEPEST_OUTLINE = 4.0
-#: A turned surface keeps away from its axis by this share of its largest radius.
-NEAR_AXIS = 0.08
 #: Radii beyond this many sizes of the region are those of planes.
 LARGEST_RADIUS = 50.0
 #: How far the centroid of points on a sphere is from its centre, in radii: of a bit more than a half, and of the whole.
@@ -65,8 +61,8 @@ class Samples:
 
 def fits(surface: Surface, samples: Samples, tolerance: float) -> bool:
     """Whether a surface lies within the tolerance of nearly all points, and its normals agree with theirs."""
-    gaps = np.abs(surface.distances(samples.points))
-    if np.mean(gaps <= tolerance) < WITHIN:
+    near = np.abs(surface.distances(samples.points)) <= tolerance
+    if np.mean(near & surface.regular(samples.points)) < WITHIN:
         return False
     cosines = np.einsum("nk,nk->n", surface.normals(samples.points), samples.normals)
     return bool(np.mean(cosines >= np.cos(SAME_NORMAL)) >= AGREEING)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -13,14 +13,16 @@ from graspatlas.patches.flat import Plane
 from graspatlas.patches.round import Sphere, Torus
 from graspatlas.patches.spline import BSpline
 from graspatlas.patches.turned import Cone, Cylinder, Revolution
-from graspatlas.support.arrays import Array
+from graspatlas.support.arrays import Array, BoolArray
 
 __all__ = ["Ball", "Flat", "Graph", "Outline", "Surface", "Turned", "vector"]
 
 #: The outermost latitudes of a sphere that a patch has [rad]: 86 degrees.
 LATITUDE = 1.5
 #: Least distance of a patch from its axis, as a share of its largest radius.
-NEAR_AXIS = 0.02
+NEAR_AXIS = 0.05
+#: Steepest slope of an outline, radius by height: where it is steeper, it turns towards the axis.
+STEEPEST = 4.0
 
 
 def vector(values: Array) -> Vector3:
@@ -60,6 +62,14 @@ class Surface(ABC):
         """Whether it is the inside of what it is named after."""
         return False
 
+    def regular(self, points: Array) -> BoolArray:
+        """At which of the points a patch of this surface is regular (n,)."""
+        return np.ones(len(points), bool)
+
+    def centered(self, points: Array) -> Surface:
+        """The same surface with u = v = 0 in the middle of points, where that is free to choose."""
+        return self
+
 
 @dataclass(frozen=True, eq=False)
 class Flat(Surface):
@@ -80,6 +90,11 @@ class Flat(Surface):
     def parameters(self, points: Array) -> Array:
         """Coordinates along the plane."""
         return np.asarray((points - self.origin) @ self.axes[:, :2])
+
+    def centered(self, points: Array) -> Surface:
+        """The plane with its origin in the middle of the rectangle around points."""
+        uv = self.parameters(points)
+        return replace(self, origin=self.origin + self.axes[:, :2] @ (0.5 * (uv.min(axis=0) + uv.max(axis=0))))
 
     def patch(self, u: Interval | None, v: Interval) -> Patch:
         """A plane."""
@@ -152,7 +167,7 @@ class Outline:
         """Signed distances, positive away from the axis, or out of the tube (n,)."""
         if self.kind == "torus":
             return np.asarray(np.hypot(r - self.radii[0], h - self.heights[0]) - self.tube)
-        radius, slope = self._radius(h)
+        radius, slope = self.radius(h)
         return np.asarray((r - radius) / np.hypot(1.0, slope))
 
     def normals(self, h: Array, r: Array) -> tuple[Array, Array]:
@@ -160,7 +175,7 @@ class Outline:
         if self.kind == "torus":
             along, across = h - self.heights[0], r - self.radii[0]
         else:
-            along, across = -self._radius(h)[1], np.ones_like(r)
+            along, across = -self.radius(h)[1], np.ones_like(r)
         length = np.maximum(np.hypot(along, across), 1e-300)
         return along / length, across / length
 
@@ -171,8 +186,8 @@ class Outline:
         along, across = self.normals(h, r)
         return np.asarray(h - along * self.distances(h, r)) if self.kind == "cone" else h
 
-    def _radius(self, h: Array) -> tuple[Array, Array]:
-        """Radius and its slope at heights; beyond the ends straight on."""
+    def radius(self, h: Array) -> tuple[Array, Array]:
+        """The radius and its slope at heights; beyond the ends straight on."""
         if self.kind != "revolution":
             (h0, h1), (r0, r1) = self.heights, self.radii
             slope = (r1 - r0) / (h1 - h0)
@@ -223,6 +238,15 @@ class Turned(Surface):
         out = np.column_stack([share * x, along, share * z]) @ self.axes.T
         return -out if self.flipped else out
 
+    def regular(self, points: Array) -> BoolArray:
+        """Where the radius is neither small nor steep by height."""
+        if self.outline.kind not in ("cone", "revolution"):
+            return np.ones(len(points), bool)
+        radius, slope = self.outline.radius(self._flat(points)[0])
+        least = NEAR_AXIS * float(self.outline.radii.max())
+        steep = np.abs(slope) > STEEPEST if self.outline.kind == "revolution" else np.zeros(len(points), bool)
+        return np.asarray((radius >= least) & ~steep)
+
     def parameters(self, points: Array) -> Array:
         """Angles about the axis, and what the outline has along itself."""
         h, r, x, z = self._flat(points)
@@ -252,7 +276,7 @@ class Turned(Surface):
             )
         if outline.kind == "cone":
             ends = np.array(v)
-            radii, _ = outline._radius(ends)
+            radii, _ = outline.radius(ends)
             least = NEAR_AXIS * float(radii.max())
             if radii.min() < least:  # the apex is singular
                 slope = (radii[1] - radii[0]) / (ends[1] - ends[0])

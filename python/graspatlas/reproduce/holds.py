@@ -16,13 +16,13 @@ from graspatlas.reproduce.runs import Setting, run
 from graspatlas.requirements.collision_free import CollisionFree
 from graspatlas.requirements.screening import screen
 from graspatlas.result.result import Result
-from graspatlas.support.mujoco_library import mujoco_library
 from graspatlas.simulation.outcome import Simulation
 from graspatlas.simulation.protocols import PROTOCOLS
 from graspatlas.simulation.recording import record
 from graspatlas.simulation.runs import simulate_grasps
 from graspatlas.simulation.trials import GROWTH
 from graspatlas.support.arrays import Array
+from graspatlas.support.mujoco_library import mujoco_library
 from graspatlas.viewer.figures.style import Picture
 from graspatlas.viewer.render.film_strip import draw_rows
 from graspatlas.viewer.scene.trial_film import trial_strips

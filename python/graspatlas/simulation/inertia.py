@@ -11,8 +11,8 @@ import numpy as np
 from graspatlas.collision.shapes import Shape
 from graspatlas.hand.body import Body
 from graspatlas.simulation.mjcf import add_shape
-from graspatlas.support.mujoco_library import mujoco_library
 from graspatlas.support.arrays import Array
+from graspatlas.support.mujoco_library import mujoco_library
 
 __all__ = ["unit_inertia"]
 

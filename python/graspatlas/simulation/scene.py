@@ -20,9 +20,9 @@ from graspatlas.numerics.rotations import quaternions_from_matrices
 from graspatlas.problem.problem import Problem
 from graspatlas.simulation.inertia import unit_inertia
 from graspatlas.simulation.mjcf import add_inertial, add_shape, child, pose, text
-from graspatlas.support.mujoco_library import mujoco_library
 from graspatlas.simulation.protocols import Protocol
 from graspatlas.support.arrays import Array
+from graspatlas.support.mujoco_library import mujoco_library
 
 if TYPE_CHECKING:
     import mujoco

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from graspatlas.simulation.motion import Motion
-from graspatlas.support.mujoco_library import mujoco_library
 from graspatlas.simulation.scene import HAND, OBJECT, Scene
 from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.support.machine import available_threads
+from graspatlas.support.mujoco_library import mujoco_library
 
 if TYPE_CHECKING:
     import mujoco

@@ -151,8 +151,8 @@ class _Converter:
             kind = self._kind(joint)
             if kind in ("ball", "free"):
                 raise GraspAtlasError(
-                    f"joint '{self._names.joints[joint]}' of '{self._path}' is a {kind} joint, which a hand cannot have "
-                    "here: state hinges about three axes in its place, or choose a root: that is not above it"
+                    f"joint '{self._names.joints[joint]}' of '{self._path}' is a {kind} joint, which no hand "
+                    "can have here: state hinges about three axes in its place, or choose a root: that is not above it"
                 )
         if not moving:
             raise GraspAtlasError(
@@ -281,7 +281,7 @@ class _Converter:
             terms = ", ".join(f"{a:g}" for a in (a0, a1, *higher))
             raise GraspAtlasError(
                 f"joint '{name}' of '{self._path}' follows '{other}' by a polynomial that is not linear ({terms}); "
-                "hands know linear couplings: state its slope alone (polycoef), or take the equality out and lock the joint"
+                "hands know linear couplings: state its slope alone (polycoef), or take it out and lock the joint"
             )
         y0, x0 = (float(model.qpos0[model.jnt_qposadr[j]]) for j in (joint, driver))
         return a1, y0 + a0 - a1 * x0
@@ -302,14 +302,15 @@ class _Converter:
         coupling = [t for t in range(model.ntendon) if model.tendon_num[t] > 1]
         if coupling:
             self._notes.append(
-                f"{_listed('tendon', [names.tendons[t] for t in coupling])} of several joints: not kept; say what moves "
-                "together by an equality of joints, or by couplings under hand_motions"
+                f"{_listed('tendon', [names.tendons[t] for t in coupling])} of several joints: not kept; say what "
+                "moves together by an equality of joints, or by couplings under hand_motions"
             )
         self._notes += shapes.notes
 
     def _carriers(self) -> list[int]:
         """The palm and the bodies that carry it, but for the world."""
-        bodies, body = [], self._root
+        bodies: list[int] = []
+        body = self._root
         while body > 0:
             bodies.insert(0, body)
             body = self._parent(body)

@@ -76,7 +76,9 @@ class ShapeWriter:
         """Add a geom to a link: as collision shape if it takes part in contacts, as visual one if it is seen."""
         found = self._geometry(geom)
         if found is None:
-            self.notes.append(f"geom '{self._names.geom(geom)}' is a {self._kind(geom)}, which a hand cannot have: left out")
+            self.notes.append(
+                f"geom '{self._names.geom(geom)}' is a {self._kind(geom)}, which a hand cannot have: left out"
+            )
             return
         kind, attributes, T = found
         solid = collides(self._model, geom)
@@ -123,7 +125,7 @@ class ShapeWriter:
         if mesh not in self._meshes:
             model = self._model
             scale = np.asarray(model.mesh_scale[mesh], float)
-            inverse = np.linalg.inv(pose(model.mesh_pos[mesh], model.mesh_quat[mesh]))
+            inverse: Array = np.linalg.inv(pose(model.mesh_pos[mesh], model.mesh_quat[mesh])).astype(float)
             first = int(model.mesh_vertadr[mesh])
             corners = np.asarray(model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])], float)
             file = self._file(mesh)
@@ -171,7 +173,7 @@ def _are_same(file: Path, scale: Array, corners: Array, inverse: Array) -> bool:
     moved = (stated * scale) @ inverse[:3, :3].T + inverse[:3, 3]
     size = float(np.ptp(corners, axis=0).max())
     ends = [np.abs(end(moved) - end(corners)).max() for end in (_lowest, _highest)]
-    return max(ends) <= SAME * size
+    return bool(max(ends) <= SAME * size)
 
 
 def _lowest(points: Array) -> Array:
