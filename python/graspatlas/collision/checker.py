@@ -90,6 +90,11 @@ class CollisionChecker:
         numbers = np.array([(pair.first, pair.second) for pair in pairs], np.int32).reshape(-1, 2)
         self.batch = _core.CollisionBatch(model, [shape.as_tuple() for shape in shapes], numbers, self.required)
 
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """The shapes of hand and object, by whose names the pairs go."""
+        return self._shapes
+
     def first_collision(self, x: ArrayLike) -> tuple[str, str] | None:
         """Names of the first two shapes found in collision at a grasp, or None.
 

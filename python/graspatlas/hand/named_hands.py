@@ -16,6 +16,7 @@ from graspatlas.hand.robot_files import (
     described_robot,
     example_names,
     example_robot,
+    find_file,
 )
 from graspatlas.storage.files import is_file
 
@@ -93,7 +94,14 @@ def _of_file(path: str, root: str | None) -> NamedHand:
         raise GraspAtlasError(
             f"root names the palm of an MJCF, and '{path}' is a URDF, which has its own: leave it out"
         )
-    return NamedHand(Hand.from_urdf(path), {"urdf": path})
+    return _of_urdf(path)
+
+
+def _of_urdf(path: str) -> NamedHand:
+    """A hand of a URDF, with the SRDF of the same name beside it where there is one."""
+    srdf = find_file(path, None).with_suffix(".srdf")
+    source = {"urdf": path, **({"srdf": str(Path(path).with_suffix(".srdf"))} if is_file(srdf) else {})}
+    return NamedHand(Hand.from_urdf(path, srdf=source.get("srdf")), source)
 
 
 def _of_library(kind: str, name: str, root: str | None) -> NamedHand:
@@ -106,7 +114,7 @@ def _of_name(name: str, root: str | None) -> NamedHand:
     """A hand by its bare name, of the first library that has one."""
     bundled, examples, described = bundled_hands(), example_names(), described_names()
     if name in bundled:
-        return NamedHand(Hand.from_urdf(bundled[name]), {"urdf": bundled[name]})
+        return _of_urdf(bundled[name])
     if name in examples:
         return _of_library(EXAMPLE, name, root)
     for full in (name, f"{name}_description", f"{name}_mj_description"):

@@ -12,8 +12,8 @@ from graspatlas.meshes.reading import AnyMesh, read_mesh, trimesh_library
 from graspatlas.meshes.triangles import TriangleMesh, cross_products
 from graspatlas.meshes.turning import turned_outwards, unfolded
 from graspatlas.numerics.groups import linked_groups
-from graspatlas.support.validation import positive
 from graspatlas.support.arrays import Array, IntArray
+from graspatlas.support.validation import positive
 
 if TYPE_CHECKING:
     import trimesh
@@ -103,7 +103,9 @@ class Repair:
             (self.twisted, "faces without an outside"),
         )
         x, y, z = (1e3 * length for length in self.extents)
-        words = [f"{self.faces} faces in {self.pieces} piece{'s' if self.pieces != 1 else ''}, {x:.4g} x {y:.4g} x {z:.4g} mm"]
+        words = [
+            f"{self.faces} faces in {self.pieces} piece{'s' if self.pieces != 1 else ''}, {x:.4g} x {y:.4g} x {z:.4g} mm"
+        ]
         words += [f"{count} {what}" for count, what in counts if count]
         words += ["watertight"] if self.watertight else [f"still {count} {what}" for count, what in left if count]
         if self.places:

@@ -102,7 +102,9 @@ def unfolded(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     both = np.r_[i, j], np.r_[j, i]
     turned = np.einsum("nk,nk->n", normals[both[0]], normals[both[1]]) < FOLDED
     against = np.bincount(both[0], turned, len(areas))
-    around = np.bincount(both[0], areas[both[1]], len(areas)) / np.maximum(np.bincount(both[0], minlength=len(areas)), 1)
+    around = np.bincount(both[0], areas[both[1]], len(areas)) / np.maximum(
+        np.bincount(both[0], minlength=len(areas)), 1
+    )
     folded = np.flatnonzero((against >= 2) & (areas < SLIVER * around))
     if len(folded) == 0 or len(folded) > MOST_FOLDS:
         return mesh, 0

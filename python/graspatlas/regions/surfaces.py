@@ -347,13 +347,15 @@ class Graph(Surface):
     def patch(self, u: Interval | None, v: Interval) -> Patch:
         """A B-spline, whose control points lie over the means of its knots (Greville's abscissae)."""
         means = [
-            np.lib.stride_tricks.sliding_window_view(knots[1:-1], 3).mean(axis=1) for knots in (self.u_knots, self.v_knots)
+            np.lib.stride_tricks.sliding_window_view(knots[1:-1], 3).mean(axis=1)
+            for knots in (self.u_knots, self.v_knots)
         ]
         x, y = np.meshgrid(*means, indexing="ij")
         points = np.stack([x, y, self.net], axis=-1) @ self.axes.T + self.origin
         ends = [(float(k[3]), float(k[-4])) for k in (self.u_knots, self.v_knots)]
         kept = [
-            (max(low, least), min(high, most)) for (low, high), (least, most) in zip((u or ends[0], v), ends, strict=True)
+            (max(low, least), min(high, most))
+            for (low, high), (least, most) in zip((u or ends[0], v), ends, strict=True)
         ]
         return BSpline(
             control_points=tuple(tuple(vector(p) for p in row) for row in points),

@@ -187,6 +187,16 @@ class GraspSearch:
         starts = list(self._near_guess)
         return self._tried(np.array(starts).reshape(len(starts), self.system.configuration_size))
 
+    def attempts_at(self, postures: Array, points: Array) -> Array:
+        """Tries from postures with the contacts of the object at given points: the feasible grasps (n, size of x).
+
+        Args:
+            postures: Joint configurations (n, nq).
+            points: Where each contact is on the object, in its frame (n, m, 3) [m].
+        """
+        starts = [self._starts.at_points(q, p, self._rng) for q, p in zip(postures, points, strict=True)]
+        return self._tried(np.array(starts).reshape(len(starts), self.system.configuration_size))
+
     def attempts(self, count: int) -> Array:
         """So many tries at random, on all cores: the feasible grasps that they gave (n, size of x)."""
         return self._tried(np.array([self._starts.draw(self._rng) for _ in range(count)]))

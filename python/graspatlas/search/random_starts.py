@@ -74,15 +74,33 @@ class Starts:
         x[self._pose] = self._joint.nearest(xyz, rotation)
         at = len(x) - len(self._lower)
         x[at:] = rng.uniform(self._lower, self._upper)
-        points = (self._system.grasp_arrays(x[None])["hand_points"][0] - xyz) @ rotation.as_matrix()
+        self._locate(x, (self._system.grasp_arrays(x[None])["hand_points"][0] - xyz) @ rotation.as_matrix())
+        return x
+
+    def at_points(self, q: Array, points: Array, rng: np.random.Generator) -> Array:
+        """A start (configuration_size,) in a posture, with the contacts of the object about where it has these points.
+
+        Args:
+            q: The posture (nq,).
+            points: A point on the object for each contact, in its frame (m, 3) [m].
+            rng: Random numbers, for the free parameters of the hand's patches.
+        """
+        x: Array = self._reference.copy()
+        x[: len(q)] = q
+        at = len(x) - len(self._lower)
+        x[at:] = rng.uniform(self._lower, self._upper)
+        self._locate(x, points)
+        return self._place_object(x, rng)
+
+    def _locate(self, x: Array, points: Array) -> None:
+        """Set the free parameters of the object's patches in x to where these come nearest to points (m, 3)."""
+        first = at = len(x) - len(self._lower)
         for contact, point in zip(self._problem.contacts, points, strict=True):
             of_hand, of_object = contact.sides
             at += len(of_hand.free)
             x[at : at + len(of_object.free)] = of_object.values_of_free(of_object.patch.locate(point))
             at += len(of_object.free)
-        first = len(x) - len(self._lower)
         x[first:] = np.clip(x[first:], self._lower, self._upper)
-        return x
 
     def pose(self, x: Array) -> tuple[Array, Rotation]:
         """Position (3,) and rotation of the object in the palm's frame at a configuration x."""

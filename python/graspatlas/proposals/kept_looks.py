@@ -1,0 +1,72 @@
+"""Looks at assignments that are kept in files, so that a search that was broken off does none twice."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from graspatlas.proposals.matching import Assignment
+from graspatlas.proposals.plan import Plan
+from graspatlas.proposals.trial import Look, LookEnd
+from graspatlas.quality.batched import quality_name
+from graspatlas.requirements.base import requirement_name
+from graspatlas.storage.run_files import damaged, read_run_file, write_run_file
+
+__all__ = ["KeptLooks"]
+
+#: Changes when a look of an older version would not be the same.
+VERSION = 1
+_KINDS = {"end": "U", "why": "U", "value": "f", "x": "f", "postures": "f"}
+
+
+class KeptLooks:
+    """A folder with a file for each look.
+
+    Args:
+        folder: The folder.
+        plan: What the looks belong to.
+        assignments: The assignments, in their order.
+    """
+
+    def __init__(self, folder: Path, plan: Plan, assignments: Sequence[Assignment]) -> None:
+        self.folder = folder
+        stated = [
+            VERSION,
+            dict(plan.source),
+            plan.body.to_dict(),
+            quality_name(plan.quality),
+            [requirement_name(requirement) for requirement in plan.requirements],
+            plan.length_scale,
+            plan.seed,
+            [(each.name, each.score, each.fingers.hand.urdf) for each in assignments],
+        ]
+        self._digest = hashlib.sha256(json.dumps(stated, sort_keys=True, default=str).encode()).hexdigest()
+
+    def look(self, number: int) -> Look | None:
+        """The look at an assignment; None where it is still to be done.
+
+        Raises:
+            GraspAtlasError: If its file is damaged, or belongs to another hand, mesh or other arguments.
+        """
+        path = self._path(number)
+        if not path.exists():
+            return None
+        part = read_run_file(path, self._digest)
+        if set(part) != set(_KINDS) or any(array.dtype.kind != _KINDS[name] for name, array in part.items()):
+            raise damaged(path)
+        return Look(LookEnd(str(part["end"])), float(part["value"]), part["x"], part["postures"], str(part["why"]))
+
+    def keep(self, number: int, look: Look) -> Look:
+        """Keep a look, and hand it back.
+
+        Raises:
+            GraspAtlasError: If its file cannot be written.
+        """
+        values = {"end": str(look.end), "why": look.why, "value": look.value, "x": look.x, "postures": look.postures}
+        write_run_file(self._path(number), self._digest, values)
+        return look
+
+    def _path(self, number: int) -> Path:
+        return self.folder / f"{number:05}.npz"

@@ -1,0 +1,36 @@
+"""What proposals are made of, and the numbers that fix them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from graspatlas.hand.body import Body
+from graspatlas.quality.batched import Quality
+from graspatlas.requirements.base import RequirementLike
+from graspatlas.support.pickling import Light
+
+__all__ = ["Plan"]
+
+
+@dataclass(frozen=True)
+class Plan(Light):
+    """What all assignments of one hand and one object have in common.
+
+    Attributes:
+        source: How a problem file names the hand: ``{"urdf": path}`` and so on.
+        body: The object.
+        quality: The index that ranks proposals.
+        requirements: What grasps must meet.
+        radius: r, of the charts of the atlases.
+        length_scale: Length that counts as much as one radian [m].
+        seed: Of the random numbers.
+    """
+
+    source: Mapping[str, str]
+    body: Body
+    quality: Quality
+    requirements: tuple[RequirementLike, ...]
+    radius: float = 0.3
+    length_scale: float = 0.01
+    seed: int = 0
