@@ -27,7 +27,7 @@ FRICTION, BALANCED = 0.8, 0.15
 #: Length that counts as much as an angle whose cosine differs by this, as a share of the hand's size.
 LENGTH, COSINE = 0.06, 0.35
 #: Assignments farther from all postures than this are out of reach.
-OUT_OF_REACH = 2.5
+OUT_OF_REACH = 4.0
 #: Starts that each keeps.
 STARTS = 24
 #: Tuples of regions that are looked at, at most: those of the largest regions.
