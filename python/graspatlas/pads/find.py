@@ -22,7 +22,7 @@ from graspatlas.pads.surface import bounding_points, frame_along, look
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import checked_instance
 
-__all__ = ["find_pads"]
+__all__ = ["find_pads", "open_posture"]
 
 #: Rays along each side of the square through which a link is looked at as a whole.
 RAYS = 96
@@ -89,14 +89,22 @@ def find_pads(hand: Hand, links: Sequence[str] | None = None) -> tuple[Pad, ...]
     """
     checked_instance(hand, Hand, "hand")
     bodies = _bodies(hand)
-    ends = {number: _end(body) for number, body in bodies.items()}
-    closing = Closing(hand, ends)
+    closing = _closing(hand, bodies)
     if links is None:
         tips = [number for number in closing.fingertips if number in bodies]
         if not tips:
             raise GraspAtlasError(f"no fingertip of hand '{hand.name}' has a shape; name links that have some")
         return tuple(_fingertip(closing, bodies[number], number) for number in tips)
     return tuple(_pad_of(hand, closing, bodies, link) for link in links)
+
+
+def open_posture(hand: Hand, share: float = 0.2) -> dict[str, float]:
+    """Positions of all joints of a hand that is open, or flexed by a share of its joints' ranges [rad or m]."""
+    return _closing(hand, _bodies(hand)).posture(share)
+
+
+def _closing(hand: Hand, bodies: dict[int, _Body]) -> Closing:
+    return Closing(hand, {number: _end(body) for number, body in bodies.items()})
 
 
 def _bodies(hand: Hand) -> dict[int, _Body]:
