@@ -6,24 +6,23 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.hand import Hand
 from graspatlas.hand.robot_files import (
+    MJCF_ENDINGS,
     bundled_hands,
     described_names,
     described_robot,
     example_names,
     example_robot,
+    is_mjcf,
 )
 from graspatlas.storage.files import is_file
 
-__all__ = ["NamedHand", "described_hand", "is_mjcf", "named_hand"]
+__all__ = ["NamedHand", "described_hand", "named_hand"]
 
 EXAMPLE, DESCRIBED = "example_robot_data", "robot_descriptions"
-#: File names that end so are MJCF, whatever stands in them.
-_MJCF = (".mjcf", ".xml")
 
 
 @dataclass(frozen=True)
@@ -57,21 +56,10 @@ def named_hand(word: str, root: str | None = None) -> NamedHand:
     if is_file(word):
         path = str(Path(word).resolve())
         return _of_file(path, root)
-    looks_like_path = os.sep in word or Path(word).suffix.lower() in (*_MJCF, ".urdf")
+    looks_like_path = os.sep in word or Path(word).suffix.lower() in (*MJCF_ENDINGS, ".urdf")
     if looks_like_path:
         raise GraspAtlasError(f"file '{word}' does not exist; give a URDF, an MJCF, {EXAMPLE}:NAME or {DESCRIBED}:NAME")
     return _of_name(word, root)
-
-
-def is_mjcf(path: str | Path) -> bool:
-    """Whether a file is an MJCF: by its first element, or where that cannot be read by its name's ending."""
-    try:
-        with open(path, "rb") as stream:
-            for _, element in ElementTree.iterparse(stream, events=("start",)):
-                return str(element.tag) == "mujoco"
-    except (OSError, ElementTree.ParseError):
-        pass
-    return Path(path).suffix.lower() in _MJCF
 
 
 def described_hand(name: str, root: str | None = None) -> Hand:
