@@ -17,7 +17,19 @@ NAME = "graspatlas"
 #: The floors from the lowest to the highest: packages, and files that lie beside them. Each may import those below it.
 FLOORS = (
     *("_core", "version", "errors", "start_up", "libraries", "doctor"),
-    *("support", "storage", "numerics", "cluster", "systems", "patches", "hand", "problem", "collision", "pads", "execution"),
+    *(
+        "support",
+        "storage",
+        "numerics",
+        "cluster",
+        "systems",
+        "patches",
+        "hand",
+        "problem",
+        "collision",
+        "pads",
+        "execution",
+    ),
     *("atlas", "grasps", "search", "quality", "requirements"),
     *(
         "testing",

@@ -1,4 +1,4 @@
-"""Hands in MJCF, against MuJoCo itself: where links are, shapes, limits, couplings; what is left out, what is refused."""
+"""Hands in MJCF, against MuJoCo itself: where links are, shapes, limits, couplings; what is refused or left out."""
 
 from __future__ import annotations
 
