@@ -50,6 +50,14 @@ def named_hand(word: str, root: str | None = None) -> NamedHand:
     Raises:
         GraspAtlasError: If there is no such hand, or it cannot be read.
     """
+    found = _found(word, root)
+    if root and "root" not in found.source:
+        raise GraspAtlasError(f"root names the palm of an MJCF, and '{word}' is a URDF, which has its own: drop it")
+    return found
+
+
+def _found(word: str, root: str | None) -> NamedHand:
+    """The hand that a word names; the root counts where it is an MJCF."""
     kind, _, name = word.partition(":")
     if kind in (EXAMPLE, DESCRIBED) and name:
         return _of_library(kind, name, root)
@@ -77,17 +85,15 @@ def described_hand(name: str, root: str | None = None) -> Hand:
 def _of_file(path: str, root: str | None) -> NamedHand:
     if is_mjcf(path):
         return NamedHand(Hand.from_mjcf(path, root=root), {"mjcf": path, **({"root": root} if root else {})})
-    if root:
-        raise GraspAtlasError(
-            f"root names the palm of an MJCF, and '{path}' is a URDF, which has its own: leave it out"
-        )
     return NamedHand(Hand.from_urdf(path), {"urdf": path})
 
 
 def _of_library(kind: str, name: str, root: str | None) -> NamedHand:
     if kind == EXAMPLE:
         return NamedHand(Hand.from_urdf(example_robot(name), name=name), {kind: name})
-    return NamedHand(described_hand(name, root), {kind: name, **({"root": root} if root else {})})
+    path = described_robot(name)[0]
+    rooted = {"root": root} if root and is_mjcf(path) else {}
+    return NamedHand(described_hand(name, root), {kind: name, **rooted})
 
 
 def _of_name(name: str, root: str | None) -> NamedHand:

@@ -23,7 +23,7 @@ from graspatlas.pads.surface import bounding_points, frame_along, look
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import checked_instance
 
-__all__ = ["find_pads", "open_posture"]
+__all__ = ["closing_of", "find_pads"]
 
 #: Rays along each side of the square through which a link is looked at as a whole.
 RAYS = 96
@@ -119,9 +119,9 @@ def _fingertips(hand: Hand, closing: Closing, bodies: Mapping[int, _Body]) -> tu
     return tuple(pads)
 
 
-def open_posture(hand: Hand, share: float = 0.2) -> dict[str, float]:
-    """Positions of all joints of a hand that is open, or flexed by a share of its joints' ranges [rad or m]."""
-    return _closing(hand, _bodies(hand)).posture(share)
+def closing_of(hand: Hand) -> Closing:
+    """How a hand closes; it has postures of the hand that is open, or flexed by any share of its joints' ranges."""
+    return _closing(hand, _bodies(hand))
 
 
 def _closing(hand: Hand, bodies: dict[int, _Body]) -> Closing:

@@ -91,9 +91,9 @@ def _spread(labels: list[_Label], height: int) -> list[_Label]:
     before = np.concatenate([[0.0], np.cumsum(tall)[:-1]])
     wanted = np.array([label.anchor[1] - label.image.height / 2.0 for label in labels]) - before
     places = _ascending(wanted) + before
-    low, high = 0.11 * height, 0.9 * height - tall[-1]
-    places += max(low - places[0], 0.0)
-    places -= max(min(places[-1] - high, places[0] - low), 0.0)
+    # In the picture all the same: from the top down, and from the bottom up.
+    low, high = 0.11 * height + before, 0.9 * height - (before[-1] + tall[-1] - before)
+    places = np.maximum(np.minimum(places, high), low)
     return [_Label(label.image, label.anchor, label.left, float(y)) for label, y in zip(labels, places, strict=True)]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from graspatlas.hand.hand import Hand
 from graspatlas.numerics.rotations import matrix_from_quaternion
-from graspatlas.pads.find import open_posture
+from graspatlas.pads.find import closing_of
 from graspatlas.pads.pad import Pad
 from graspatlas.patches.base import Patch
 from graspatlas.problem.contacts import ContactSide
@@ -30,6 +30,10 @@ ABOVE = 0.0015
 STEPS = 25
 #: A patch without bounds is drawn to this far from its point, as a share of that diagonal.
 CUT = 0.05
+#: Hands are drawn open: flexed by this share of their joints' ranges; or by the one of these that comes nearest to
+#: touching, where nothing says how the hand is held.
+OPEN = 0.2
+SHARES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 #: The bodies are lighter than in other pictures, so that what is drawn on them stands out: share of white.
 WHITE = 0.45
 #: Directions from which a hand may be seen: round z, and above the horizon [rad].
@@ -115,7 +119,7 @@ class Marked:
 
 def marked_hand(hand: Hand, pads: Sequence[Pad]) -> Marked:
     """A hand that is nearly open, with its pads, their normals and names."""
-    placements = hand.link_placements(hand.configuration(open_posture(hand)))
+    placements = hand.link_placements(hand.configuration(closing_of(hand).posture(OPEN)))
     parts = [Part("hand", mesh, T, _lighter(colour)) for mesh, T, colour in BodyMeshes(hand).on_links(placements)]
     size = _size_of(parts)
     marks = []
@@ -177,21 +181,32 @@ def _setup(problem: Problem) -> tuple[Array, Array, str]:
         x1 = problem.x1
         T = _pose(x1.object_xyz, x1.object_quat_xyzw)
         return problem.x1_array[:nq], T, "at x1"
+    closing = closing_of(problem.hand)
     if problem.reference is not None:
-        posture, what = {**open_posture(problem.hand), **problem.reference}, "the hand at its reference"
-        posture = problem.hand.mechanism.completed(posture, "the reference")
+        posture = {**closing.posture(OPEN), **problem.reference}
+        what, postures = "the hand at its reference", [problem.hand.mechanism.completed(posture, "the reference")]
     else:
-        posture, what = open_posture(problem.hand, 0.35), "before it is solved"
-    q = problem.hand.configuration(posture)
+        what, postures = "before it is solved", [closing.posture(share) for share in SHARES]
+    configurations = [problem.hand.configuration(posture) for posture in postures]
     if problem.pose_guess is not None:
         guess = problem.pose_guess
-        return q, _pose(guess.xyz, guess.quat_xyzw or (0.0, 0.0, 0.0, 1.0)), f"{what}, the object at the pose guess"
+        T = _pose(guess.xyz, guess.quat_xyzw or (0.0, 0.0, 0.0, 1.0))
+        q = min(configurations, key=lambda q: _gap(problem, q, T))
+        return q, T, f"{what}, the object at the pose guess"
+    q = configurations[len(configurations) // 2]
     placements = problem.hand.link_placements(q)
     on_hand = [_mark(c.sides[0], placements[c.frame], "", "").point for c in problem.contacts]
     on_object = [_mark(c.sides[1], np.eye(4), "", "").point for c in problem.contacts]
     T = np.eye(4)
     T[:3, 3] = np.mean(on_hand, axis=0) - np.mean(on_object, axis=0)
     return q, T, f"{what}, the object anywhere between the fingers (no x1, no pose_guess)"
+
+
+def _gap(problem: Problem, q: Array, T_object: Array) -> float:
+    """How far hand and object are from touching at the contacts, at a configuration of the hand [m]."""
+    placements = problem.hand.link_placements(q)
+    marks = [_touching(problem, i, placements[c.frame], T_object) for i, c in enumerate(problem.contacts)]
+    return float(sum(np.linalg.norm(a.point - b.point) for a, b in marks))
 
 
 def _pose(xyz: Sequence[float], quaternion: Sequence[float]) -> Array:
