@@ -6,8 +6,9 @@ import argparse
 import importlib
 import signal
 import sys
+import warnings
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, NoReturn, TextIO
 
 from graspatlas.commands.arguments import INTERRUPTED, MISUSE
 from graspatlas.errors import GraspAtlasError
@@ -23,7 +24,7 @@ __all__ = ["main"]
 #: Modules of ``commands`` and the commands that they add, in the order in which help lists them.
 COMMANDS = {
     "listing": ("list", "doctor"),
-    "problem": ("new", "check", "schema"),
+    "problem": ("new", "check", "schema", "pads"),
     "optimize": ("optimize",),
     "ladder": ("ladder",),
     "result": ("view", "export", "check-result"),
@@ -49,7 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     hear_interrupts()
     try:
-        with stoppable(also=_REQUESTS):
+        with stoppable(also=_REQUESTS), warnings.catch_warnings():
+            warnings.showwarning = _say_warning
             status = _run(arguments)
             finish_output()
             return 128 + stopped_by() if status == INTERRUPTED and stopped_by() else status
@@ -81,6 +83,19 @@ def _run(arguments: Sequence[str] | None) -> int:
     except OSError as error:
         place = f" '{error.filename}'" if error.filename else ""
         return _misuse(f"{error.strerror or error}{place}; make sure that it can be read and written")
+
+
+def _say_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Print a warning as one line, as errors are."""
+    kind = "" if category is RuntimeWarning else f"{category.__name__}: "
+    say(shortened(" ".join(f"graspatlas: warning: {kind}{message}".split("\n"))), file=sys.stderr)
 
 
 def _misuse(reason: object) -> int:

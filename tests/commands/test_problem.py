@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from helpers import BENT, tripod_problem
+from helpers import BENT, DATA, tripod_problem
 
 import graspatlas as ga
 from graspatlas.cli import main
@@ -86,3 +86,62 @@ def test_schema(tmp_path, capsys):
     assert main(["schema", "--output", str(path)]) == 0
     assert json.loads(path.read_text()) == json_schema()
     assert main(["schema", "--output", str(tmp_path / "none" / "x.json")]) == 2
+
+
+def test_pads_are_contacts_to_paste(tmp_path, capsys, monkeypatch):
+    """The YAML of a hand's pads, each with an object, is the contacts of a problem, to a tenth of a micrometre."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["pads", "three_finger_hand", "--output", "pads.yaml", "--picture", "pads.png"]) == 0
+    assert (tmp_path / "pads.png").stat().st_size > 10_000
+    assert main(["pads", "three_finger_hand"]) == 0
+    text = (tmp_path / "pads.yaml").read_text()
+    assert capsys.readouterr().out == text
+    contacts = text.replace("- frame", "  object: {type: sphere, radius: 0.03}\n- frame").split("\n", 3)[3]
+    contacts += "  object: {type: sphere, radius: 0.03}\n"
+    head = "hand: {urdf: three_finger_hand/three_finger_hand.urdf}\nobject: {sphere: {radius: 0.03}}\ncontacts:\n"
+    problem = read_problem(head + contacts)
+    pads = ga.find_pads(problem.hand)
+    assert [contact.frame for contact in problem.contacts] == [pad.frame for pad in pads]
+    for contact, pad in zip(problem.contacts, pads, strict=True):
+        np.testing.assert_allclose(contact.hand.point(0.3, -0.2), pad.patch.point(0.3, -0.2), atol=2e-7)
+
+
+def test_pads_of_links_and_of_what_is_none(capsys):
+    assert main(["pads", "three_finger_hand", "--link", "palm"]) == 0
+    assert "- frame: palm #" in capsys.readouterr().out
+    assert main(["pads", "schunk_sah", "--link", "index_medial"]) == 0
+    out = capsys.readouterr().out
+    assert "- frame: index_medial #" in out
+    assert main(["pads", "schunk_sah", "--link", "plam"]) == 2
+    assert main(["pads", "schunk_shah"]) == 2
+    assert main(["pads", "schunk_sah", "--picture", "pads.jpg"]) == 2
+    assert main(["pads", "parallel_gripper", "--root", "palm"]) == 2
+    errors = capsys.readouterr().err
+    assert errors.count("graspatlas: error: ") == 4
+    assert "did you mean 'palm'?" in errors
+    assert "did you mean 'schunk_sah'?" in errors
+
+
+@pytest.mark.filterwarnings("default::RuntimeWarning")
+def test_new_and_pads_of_an_mjcf(tmp_path, capsys):
+    """What is left out is said in one line each time."""
+    pytest.importorskip("mujoco")
+    claw = str(DATA / "mjcf/claw.xml")
+    assert main(["new", claw, "--root", "palm", "--output", str(tmp_path / "claw.yaml")]) == 0
+    text = (tmp_path / "claw.yaml").read_text()
+    assert "  mjcf: " in text
+    assert "\n  root: palm\n" in text
+    assert main(["pads", claw, "--link", "thumb_tip"]) == 0
+    out, err = capsys.readouterr()
+    assert "- frame: thumb_tip #" in out
+    lines = err.splitlines()
+    assert len(lines) == 2
+    assert all(line.startswith("graspatlas: warning: '") and "left out" in line for line in lines)
+
+
+def test_check_draws_a_problem(tmp_path, capsys):
+    path = tmp_path / "gripper.png"
+    assert main(["check", "gripper_skittle", "--picture", str(path)]) == 0
+    assert path.stat().st_size > 10_000
+    assert main(["check", "gripper_skittle", "--picture", str(tmp_path / "gripper.svg")]) == 2
+    assert "must end in .png" in capsys.readouterr().err

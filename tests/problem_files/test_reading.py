@@ -166,7 +166,7 @@ BROKEN: dict[str, tuple[str, str, str]] = {
     "two hands": (
         "  urdf: schunk_sah/schunk_sah.urdf",
         "  urdf: schunk_sah/schunk_sah.urdf\n  example_robot_data: allegro_right_hand",
-        "can.yaml:10: hand: the hand needs exactly one of urdf, mjcf, example_robot_data, robot_descriptions, got urdf ",
+        "can.yaml:10: hand: the hand needs exactly one of urdf, mjcf, example_robot_data, robot_descriptions, got ",
     ),
     "unknown robot": (
         "  urdf: schunk_sah/schunk_sah.urdf",

@@ -113,7 +113,7 @@ def test_sheets_and_curves_are_sketched(planar_result: ga.Result) -> None:
 
 def replace_contacts(problem: ga.Problem, contacts: tuple[ga.Contact, ...]) -> SimpleNamespace:
     """What the sketch reads of a problem, with other contacts; such a problem need not have a grasp."""
-    return SimpleNamespace(hand=problem.hand, x1_array=problem.x1_array, contacts=contacts)
+    return SimpleNamespace(hand=problem.hand, x1=problem.x1, x1_array=problem.x1_array, contacts=contacts)
 
 
 # Scene

@@ -1,4 +1,4 @@
-"""The commands about problem files: graspatlas new, check and schema."""
+"""The commands about problem files: graspatlas new, check, schema and pads."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.problem import Problem
 from graspatlas.problems import bundled_problems, load_problem, problem_text
 from graspatlas.storage.files import replaced
-from graspatlas.support.terminal import say
+from graspatlas.support.terminal import printable, say
 
 __all__ = ["add_commands"]
 
 
 def add_commands(commands: Subcommands) -> None:
-    """Add new, check and schema to the subcommands of a parser."""
+    """Add new, check, schema and pads to the subcommands of a parser."""
     new = commands.add_parser("new", help="write a commented problem file for a hand, to be filled in")
     new.add_argument(
         "hand",
@@ -37,12 +37,24 @@ def add_commands(commands: Subcommands) -> None:
     check.add_argument(
         "--write-x1", action="store_true", help="write the first grasp that is found into the file, which states none"
     )
+    check.add_argument("--picture", type=path_word, metavar="FILE", help="draw patches, contacts and normals as PNG")
     check.add_argument("--json", action="store_true", help="print the findings as JSON")
     check.set_defaults(run=_check)
 
     schema = commands.add_parser("schema", help="write the JSON Schema of problem files, for editors")
     schema.add_argument("--output", type=path_word, metavar="FILE", help="file to write; standard output by default")
     schema.set_defaults(run=_schema)
+
+    pads = commands.add_parser("pads", help="find where the fingertips of a hand touch, as contacts to paste")
+    pads.add_argument(
+        "hand",
+        help="URDF or MJCF of the hand; or example_robot_data:NAME, robot_descriptions:NAME, or a name among these",
+    )
+    pads.add_argument("--link", action="append", metavar="NAME", help="link to look at, not the fingertips; repeatable")
+    pads.add_argument("--root", metavar="BODY", help="body of an MJCF that is the palm")
+    pads.add_argument("--output", type=path_word, metavar="FILE", help="YAML to write; standard output by default")
+    pads.add_argument("--picture", type=path_word, metavar="FILE", help="draw the hand with its pads as PNG")
+    pads.set_defaults(run=_pads)
 
 
 def _new(options: argparse.Namespace) -> int:
@@ -63,6 +75,10 @@ def _check(options: argparse.Namespace) -> int:
         if options.write_x1:
             problem, written = _with_x1_written(problem, options.problem, options.dimension)
         findings = [*diagnose(problem, dimension=options.dimension, radius=options.radius), *written]
+        if options.picture:
+            from graspatlas.viewer import save_problem_picture  # slow to import
+
+            save_problem_picture(problem, options.picture)
     except ProblemFileError as error:
         hint = "every field is explained in docs/problem_files.md"
         findings = [Finding(PROBLEM, "problem file", fault, hint) for fault in error.faults]
@@ -91,6 +107,21 @@ def _schema(options: argparse.Namespace) -> int:
     from graspatlas.problem_files import json_schema  # slow to import
 
     _write(json.dumps(json_schema(), indent=2) + "\n", options.output, keep=False)
+    return 0
+
+
+def _pads(options: argparse.Namespace) -> int:
+    from graspatlas.hand.named_hands import named_hand  # slow to import
+    from graspatlas.pads.find import find_pads
+    from graspatlas.pads.text import pads_text
+
+    hand = named_hand(options.hand, options.root).hand
+    pads = find_pads(hand, options.link)
+    _write(pads_text(pads, f"Pads of {printable(hand.name)}"), options.output, keep=False)
+    if options.picture:
+        from graspatlas.viewer import save_pads_picture  # slow to import
+
+        save_pads_picture(hand, pads, options.picture)
     return 0
 
 

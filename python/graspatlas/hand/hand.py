@@ -89,7 +89,7 @@ class Hand(Body):
 
         Bodies become links, hinges and slides joints, linear couplings of two joints mimics, and sites frames. Geoms
         that take part in contacts become collision shapes, those of the groups 0 to 2 visual ones. What is left out is
-        said by a ``RuntimeWarning``, a line each.
+        said by a ``RuntimeWarning``, in one line.
 
         Args:
             mjcf: Path of the file; a relative one is looked up in `folder`, then in the robots of the package.
@@ -109,8 +109,8 @@ class Hand(Body):
 
         path = find_file(mjcf, folder)
         found = convert_mjcf(path, root)
-        for note in found.notes:
-            warnings.warn(f"'{mjcf}': {note}", RuntimeWarning, stacklevel=2)
+        if found.notes:
+            warnings.warn(f"'{mjcf}': {'; '.join(found.notes)}", RuntimeWarning, stacklevel=2)
         pairs = read_text(find_file(srdf, folder)) if srdf else found.srdf
         return cls(
             name=name or path.stem,

@@ -6,25 +6,24 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.hand import Hand
 from graspatlas.hand.robot_files import (
+    MJCF_ENDINGS,
     bundled_hands,
     described_names,
     described_robot,
     example_names,
     example_robot,
     find_file,
+    is_mjcf,
 )
 from graspatlas.storage.files import is_file
 
-__all__ = ["NamedHand", "described_hand", "is_mjcf", "named_hand"]
+__all__ = ["NamedHand", "described_hand", "named_hand"]
 
 EXAMPLE, DESCRIBED = "example_robot_data", "robot_descriptions"
-#: File names that end so are MJCF, whatever stands in them.
-_MJCF = (".mjcf", ".xml")
 
 
 @dataclass(frozen=True)
@@ -52,27 +51,24 @@ def named_hand(word: str, root: str | None = None) -> NamedHand:
     Raises:
         GraspAtlasError: If there is no such hand, or it cannot be read.
     """
+    found = _found(word, root)
+    if root and "root" not in found.source:
+        raise GraspAtlasError(f"root names the palm of an MJCF, and '{word}' is a URDF, which has its own: drop it")
+    return found
+
+
+def _found(word: str, root: str | None) -> NamedHand:
+    """The hand that a word names; the root counts where it is an MJCF."""
     kind, _, name = word.partition(":")
     if kind in (EXAMPLE, DESCRIBED) and name:
         return _of_library(kind, name, root)
     if is_file(word):
         path = str(Path(word).resolve())
         return _of_file(path, root)
-    looks_like_path = os.sep in word or Path(word).suffix.lower() in (*_MJCF, ".urdf")
+    looks_like_path = os.sep in word or Path(word).suffix.lower() in (*MJCF_ENDINGS, ".urdf")
     if looks_like_path:
         raise GraspAtlasError(f"file '{word}' does not exist; give a URDF, an MJCF, {EXAMPLE}:NAME or {DESCRIBED}:NAME")
     return _of_name(word, root)
-
-
-def is_mjcf(path: str | Path) -> bool:
-    """Whether a file is an MJCF: by its first element, or where that cannot be read by its name's ending."""
-    try:
-        with open(path, "rb") as stream:
-            for _, element in ElementTree.iterparse(stream, events=("start",)):
-                return str(element.tag) == "mujoco"
-    except (OSError, ElementTree.ParseError):
-        pass
-    return Path(path).suffix.lower() in _MJCF
 
 
 def described_hand(name: str, root: str | None = None) -> Hand:
@@ -90,10 +86,6 @@ def described_hand(name: str, root: str | None = None) -> Hand:
 def _of_file(path: str, root: str | None) -> NamedHand:
     if is_mjcf(path):
         return NamedHand(Hand.from_mjcf(path, root=root), {"mjcf": path, **({"root": root} if root else {})})
-    if root:
-        raise GraspAtlasError(
-            f"root names the palm of an MJCF, and '{path}' is a URDF, which has its own: leave it out"
-        )
     return _of_urdf(path)
 
 
@@ -107,7 +99,9 @@ def _of_urdf(path: str) -> NamedHand:
 def _of_library(kind: str, name: str, root: str | None) -> NamedHand:
     if kind == EXAMPLE:
         return NamedHand(Hand.from_urdf(example_robot(name), name=name), {kind: name})
-    return NamedHand(described_hand(name, root), {kind: name, **({"root": root} if root else {})})
+    path = described_robot(name)[0]
+    rooted = {"root": root} if root and is_mjcf(path) else {}
+    return NamedHand(described_hand(name, root), {kind: name, **rooted})
 
 
 def _of_name(name: str, root: str | None) -> NamedHand:

@@ -8,22 +8,28 @@ import sys
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
+from xml.etree import ElementTree
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.storage.files import is_file
 
 __all__ = [
+    "MJCF_ENDINGS",
     "bundled_hands",
     "described_names",
     "described_robot",
     "example_names",
     "example_robot",
     "find_file",
+    "first_tag",
+    "is_mjcf",
     "package_folders",
     "robots_folder",
 ]
 
 PACKAGE = "package://"
+#: Names of MJCF files end so.
+MJCF_ENDINGS = (".mjcf", ".xml")
 
 
 def robots_folder() -> Path:
@@ -83,6 +89,23 @@ def find_file(path: str | Path, folder: Path | None, stated: tuple[str, ...] = (
         raise GraspAtlasError(f"{str(path)!r:.60}... cannot be the path of a file: it is too long, or holds a null")
     looked = " and ".join(dict.fromkeys(map(str, places)))
     raise GraspAtlasError(f"file '{path}' does not exist; looked for it at {looked}")
+
+
+def first_tag(path: str | Path) -> str:
+    """Name of the first element of an XML file; empty where there is none."""
+    try:
+        with open(path, "rb") as stream:
+            for _, element in ElementTree.iterparse(stream, events=("start",)):
+                return str(element.tag)
+    except (OSError, ElementTree.ParseError):
+        pass
+    return ""
+
+
+def is_mjcf(path: str | Path) -> bool:
+    """Whether a file is an MJCF: by its first element, or where that cannot be read by its name's ending."""
+    tag = first_tag(path)
+    return tag == "mujoco" if tag else Path(path).suffix.lower() in MJCF_ENDINGS
 
 
 def bundled_hands() -> dict[str, str]:

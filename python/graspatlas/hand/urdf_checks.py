@@ -45,7 +45,8 @@ def check_urdf(name: str, text: str) -> None:
     except (ElementTree.ParseError, ValueError) as error:
         raise GraspAtlasError(f"the URDF of '{name}' is not XML: {error}") from None
     if root.tag != "robot":
-        raise GraspAtlasError(f"the URDF of '{name}' must hold a <robot>, not a <{root.tag}>")
+        hint = "; an MJCF is read by mjcf: in a problem file, or Hand.from_mjcf" if root.tag == "mujoco" else ""
+        raise GraspAtlasError(f"the URDF of '{name}' must hold a <robot>, not a <{root.tag}>{hint}")
     for kind in ("link", "joint"):
         seen: set[str] = set()
         for element in root.findall(kind):

@@ -7,7 +7,13 @@ from numpy.typing import ArrayLike
 
 from graspatlas.support.arrays import Array
 
-__all__ = ["matrix_from_rotvec", "matrix_from_rpy", "quaternions_from_matrices", "rpy_from_matrix"]
+__all__ = [
+    "matrix_from_quaternion",
+    "matrix_from_rotvec",
+    "matrix_from_rpy",
+    "quaternions_from_matrices",
+    "rpy_from_matrix",
+]
 
 #: Cosine of the pitch below which roll and yaw turn about one axis, and roll alone is told.
 GIMBAL_LOCK = 1e-7
@@ -43,6 +49,18 @@ def matrix_from_rpy(rpy: ArrayLike) -> Array:
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
             [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
             [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def matrix_from_quaternion(xyzw: ArrayLike) -> Array:
+    """The rotation (3, 3) of a quaternion x y z w (4,), which is normalised."""
+    x, y, z, w = np.asarray(xyzw, float) / np.linalg.norm(xyzw)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
 

@@ -87,6 +87,13 @@ class Closing:
         """The middle posture with the flexors of a finger at :data:`FLEXED` of their ranges."""
         return self._followed({**self.middle, **self._flexed(self.rates(number), FLEXED)})
 
+    def posture(self, share: float) -> dict[str, float]:
+        """Positions of all joints with the fingers flexed by a share of their ranges, other joints in the middle."""
+        flexed: dict[str, float] = {}
+        for number in self.fingertips:
+            flexed |= self._flexed(self.rates(number), share)
+        return self._followed({**self.middle, **flexed})
+
     def placement(self, number: int, positions: Mapping[str, float]) -> Array:
         """T_palm_joint (4, 4) at a posture."""
         return self._placements(positions)[self.joints[number].link]

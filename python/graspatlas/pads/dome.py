@@ -28,6 +28,8 @@ SHRINK, SMALLEST = 0.85, 0.2
 WIDE_ENOUGH = 0.5
 #: A surface that bends less than this over its square is flat, as a share of the square's half side.
 FLAT = 1e-3
+#: The place of splines in the order of kinds from simple to general.
+SPLINE = 4
 #: Control points of a spline along u and v, and its degree.
 NET, DEGREE = 9, 3
 #: The normal is that of the rays within so many of the middle one.
@@ -47,8 +49,8 @@ def fit_dome(shapes: Sequence[Shape], point: Array, direction: Array, along: Arr
         largest: Half the side of the largest square to look at [m].
 
     Returns:
-        The patch; one of more general kind where the simple ones do not fit or only on less than half the square; None
-        where the surface has an edge or a hole on the smallest square too.
+        The patch: the simplest that the surface was made as, or else that is near enough to it, on at least half of the
+        largest square on which any fits. None where the surface has an edge or a hole on the smallest square too.
     """
     found: dict[tuple[int, bool], Dome] = {}
     half = largest
@@ -63,8 +65,10 @@ def fit_dome(shapes: Sequence[Shape], point: Array, direction: Array, along: Arr
     if not found:
         return None
     enough = WIDE_ENOUGH * max(dome.half for dome in found.values())
-    kinds = sorted(found, key=lambda kind: (kind[0], not kind[1]))
-    return widened(shapes, next(found[kind] for kind in kinds if found[kind].half >= enough), largest)
+    wide = {kind: dome for kind, dome in found.items() if dome.half >= enough}
+    # What the surface was made as, then what is near enough; splines fit everything and come last.
+    kinds = sorted(wide, key=lambda kind: (kind[0] == SPLINE, not kind[1], kind[0]))
+    return widened(shapes, wide[kinds[0]], largest)
 
 
 def _domes(shapes: Sequence[Shape], point: Array, direction: Array, along: Array, half: float) -> Iterator[Dome]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,7 +23,7 @@ from graspatlas.pads.surface import bounding_points, frame_along, look
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import checked_instance
 
-__all__ = ["find_pads"]
+__all__ = ["closing_of", "find_pads"]
 
 #: Rays along each side of the square through which a link is looked at as a whole.
 RAYS = 96
@@ -30,6 +31,8 @@ RAYS = 96
 FRONT = 0.03
 #: The largest patch reaches this share of the link's width to each side.
 LARGEST = 0.45
+#: A fingertip is the part of its link beyond this share of the way from the joint to the end.
+TIP = 0.55
 #: A fingertip whose patch is smaller than this share of its width has an edge there.
 NARROW = 0.12
 #: How often the closing direction of the point that is found is asked again.
@@ -85,18 +88,44 @@ def find_pads(hand: Hand, links: Sequence[str] | None = None) -> tuple[Pad, ...]
         The pads, in the order of the links or of the hand's joints.
 
     Raises:
-        GraspAtlasError: If there is no such link, a link has no shape, or nothing on it can be touched.
+        GraspAtlasError: If there is no such link, a link that is named has no shape or no smooth place to touch, or no
+            fingertip has one. Fingertips without one beside others are left out, with a ``RuntimeWarning``.
     """
     checked_instance(hand, Hand, "hand")
     bodies = _bodies(hand)
-    ends = {number: _end(body) for number, body in bodies.items()}
-    closing = Closing(hand, ends)
+    closing = _closing(hand, bodies)
     if links is None:
         tips = [number for number in closing.fingertips if number in bodies]
         if not tips:
             raise GraspAtlasError(f"no fingertip of hand '{hand.name}' has a shape; name links that have some")
-        return tuple(_fingertip(closing, bodies[number], number) for number in tips)
+        return _fingertips(hand, closing, {number: bodies[number] for number in tips})
     return tuple(_pad_of(hand, closing, bodies, link) for link in links)
+
+
+def _fingertips(hand: Hand, closing: Closing, bodies: Mapping[int, _Body]) -> tuple[Pad, ...]:
+    """The pads of fingertips; those that have no place for one are left out, with a warning."""
+    pads, faults = [], []
+    for number, body in bodies.items():
+        try:
+            pads.append(_fingertip(closing, body, number))
+        except GraspAtlasError as error:
+            faults.append((body.shapes[0].link, error))
+    if not pads:
+        raise faults[0][1]
+    if faults:
+        links = ", ".join(f"'{link}'" for link, _ in faults[:5]) + (" and more" if len(faults) > 5 else "")
+        what = f"no smooth place to touch on {links} of hand '{hand.name}': left out"
+        warnings.warn(what, RuntimeWarning, stacklevel=3)
+    return tuple(pads)
+
+
+def closing_of(hand: Hand) -> Closing:
+    """How a hand closes; it has postures of the hand that is open, or flexed by any share of its joints' ranges."""
+    return _closing(hand, _bodies(hand))
+
+
+def _closing(hand: Hand, bodies: dict[int, _Body]) -> Closing:
+    return Closing(hand, {number: _end(body) for number, body in bodies.items()})
 
 
 def _bodies(hand: Hand) -> dict[int, _Body]:
@@ -154,7 +183,7 @@ def _fingertip(closing: Closing, body: _Body, number: int) -> Pad:
         point, direction = _end(body), np.zeros(3)
         for _ in range(ROUNDS):
             direction = closing.direction(number, _beneath(body, point, direction), last=last)
-            point = _front(body, direction)
+            point = _front(body, direction, turns=not closing.joints[number].slides)
         place = _dome(closing, body, number, point, direction)
         if place is not None and (best is None or place.dome.half > best.dome.half):
             best = place
@@ -182,16 +211,23 @@ def _palm(closing: Closing, body: _Body, ends: dict[int, Array]) -> Pad:
     return _pad(closing, body, _dome(closing, body, 0, middle, direction))
 
 
-def _front(body: _Body, direction: Array) -> Array:
-    """The middle of what of a body is foremost in a direction (3,), metres."""
+def _front(body: _Body, direction: Array, turns: bool) -> Array:
+    """The middle of what of a body is foremost in a direction (3,), metres.
+
+    Args:
+        body: The body.
+        direction: The direction (3,).
+        turns: Whether its joint turns it; then it is looked at away from the joint only.
+    """
     T, xs, ys, width = _window(body, direction)
     heights = look(body.shapes, T, xs, ys).heights
-    depth = FRONT * width
-    near = np.maximum(heights - (np.nanmax(heights) - depth), 0.0)
-    near[np.isnan(near)] = 0.0
-    x, y = np.meshgrid(xs, ys, indexing="ij")
-    center = [float((near * grid).sum() / near.sum()) for grid in (x, y)]
-    return np.asarray(T[:3, :3] @ [*center, np.nanmax(heights)] + T[:3, 3])
+    points = np.stack([*np.meshgrid(xs, ys, indexing="ij"), heights], axis=-1) @ T[:3, :3].T
+    if turns:
+        along = points @ _end(body)
+        heights = np.where(along >= TIP * np.nanmax(along), heights, np.nan)
+    near = np.maximum(heights - (np.nanmax(heights) - FRONT * width), 0.0)
+    near = np.where(np.isnan(near), 0.0, near)[..., None]
+    return np.asarray((near * np.nan_to_num(points)).sum(axis=(0, 1)) / near.sum())
 
 
 def _beneath(body: _Body, point: Array, direction: Array) -> Array:

@@ -14,8 +14,7 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.body import Body
 from graspatlas.hand.hand import Hand
 from graspatlas.hand.motions import HandMotions, coupling_rows
-from graspatlas.hand.named_hands import is_mjcf
-from graspatlas.hand.robot_files import described_robot, example_robot, find_file
+from graspatlas.hand.robot_files import described_robot, example_robot, find_file, is_mjcf
 from graspatlas.hand.urdf import mesh_urdf, moving_joints
 from graspatlas.patches.registry import patch_from_dict
 from graspatlas.problem.contacts import Contact

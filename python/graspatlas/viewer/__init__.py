@@ -6,7 +6,7 @@ What draws it is imported when it is first used, so that importing the package s
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 from graspatlas.errors import GraspAtlasError
@@ -17,10 +17,14 @@ from graspatlas.simulation.recording import Recording
 if TYPE_CHECKING:
     import meshcat
 
+    from graspatlas.hand.hand import Hand
+    from graspatlas.pads.pad import Pad
+    from graspatlas.problem.problem import Problem
     from graspatlas.viewer.scene.animation import Film
+    from graspatlas.viewer.scene.marks import Marked
     from graspatlas.viewer.scene.scene import Scene
 
-__all__ = ["Shown", "export_html", "save_picture", "view"]
+__all__ = ["Shown", "export_html", "save_pads_picture", "save_picture", "save_problem_picture", "view"]
 
 #: What can be shown: a result; a path of grasps; a recorded trial, or several beside each other.
 Shown: TypeAlias = "Result | Path | Recording | Sequence[Recording]"
@@ -107,8 +111,7 @@ def save_picture(
     from graspatlas.viewer.scene.scene import Scene
     from graspatlas.viewer.scene.trial_film import trial_strips
 
-    if os.path.splitext(path)[1].lower() != ".png":
-        raise GraspAtlasError(f"a picture's name must end in .png, not '{os.fspath(path)}'")
+    _check_png(path)
     check_size(width, height)
     shown = shown if isinstance(shown, Scene) else _checked(shown)
     with replaced(path) as stream:
@@ -121,6 +124,64 @@ def save_picture(
             films = trial_strips(shown)
             image = draw_strip(films[0], width, height) if len(films) == 1 else draw_rows(films, width, height)
         image.save(stream, "PNG")
+
+
+def save_pads_picture(
+    hand: Hand, pads: Sequence[Pad], path: str | os.PathLike[str], *, width: int = 1600, height: int = 900
+) -> None:
+    """Write a picture of a hand with its pads, their normals and the names of their frames, from two sides, as PNG.
+
+    Args:
+        hand: The hand; it is drawn nearly open.
+        pads: Its pads.
+        path: Such as ``"pads.png"``; an existing file is replaced.
+        width: Width in pixels, at least 320.
+        height: Height in pixels, at least 180.
+
+    Raises:
+        GraspAtlasError: If the size is too small, a mesh cannot be read or the file cannot be written.
+    """
+    from graspatlas.viewer.scene.marks import marked_hand
+
+    _save_marked(lambda: marked_hand(hand, pads), path, width, height)
+
+
+def save_problem_picture(
+    problem: Problem, path: str | os.PathLike[str], *, width: int = 1600, height: int = 900
+) -> None:
+    """Write a picture of a problem before it is solved, from two sides, as PNG: patches, contacts and normals.
+
+    Hand and object are where x1 has them; without it, the hand at the reference, or open, and the object at the pose
+    guess.
+
+    Args:
+        problem: The problem.
+        path: Such as ``"problem.png"``; an existing file is replaced.
+        width: Width in pixels, at least 320.
+        height: Height in pixels, at least 180.
+
+    Raises:
+        GraspAtlasError: If the size is too small, a mesh cannot be read or the file cannot be written.
+    """
+    from graspatlas.viewer.scene.marks import marked_problem
+
+    _save_marked(lambda: marked_problem(problem), path, width, height)
+
+
+def _save_marked(make: Callable[[], Marked], path: str | os.PathLike[str], width: int, height: int) -> None:
+    from graspatlas.storage.files import replaced
+    from graspatlas.viewer.render.labels import draw_marked
+    from graspatlas.viewer.render.picture import check_size
+
+    _check_png(path)
+    check_size(width, height)
+    with replaced(path) as stream:
+        draw_marked(make(), width, height).save(stream, "PNG")
+
+
+def _check_png(path: str | os.PathLike[str]) -> None:
+    if os.path.splitext(path)[1].lower() != ".png":
+        raise GraspAtlasError(f"a picture's name must end in .png, not '{os.fspath(path)}'")
 
 
 def _film(shown: Path | list[Recording]) -> Film:

@@ -19,6 +19,7 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.mjcf.contacts import allowed_pairs
 from graspatlas.hand.mjcf.names import Names
 from graspatlas.hand.mjcf.shapes import ShapeWriter, pose
+from graspatlas.hand.robot_files import first_tag
 from graspatlas.numerics.rotations import matrix_from_rotvec, rpy_from_matrix
 from graspatlas.support.arrays import Array
 from graspatlas.support.mujoco_library import mujoco_library
@@ -62,6 +63,8 @@ def convert_mjcf(path: Path, root: str | None = None) -> ConvertedHand:
             anything below it, it has a ball or free joint below it, or one that follows another other than linearly.
     """
     library = mujoco_library()
+    if first_tag(path) == "robot":  # which MuJoCo would read in its own way
+        raise GraspAtlasError(f"'{path}' holds a <robot>, a URDF: say urdf: in place of mjcf:, or Hand.from_urdf")
     try:
         model = library.MjModel.from_xml_path(str(path))
     except (ValueError, OSError) as error:
@@ -240,10 +243,21 @@ class _Converter:
             efforts.append(float(np.abs(model.jnt_actfrcrange[joint]).max()))
         for actuator in range(model.nu):
             driven = int(model.actuator_trntype[actuator]) == int(library.mjtTrn.mjTRN_JOINT)
-            if driven and model.actuator_trnid[actuator, 0] == joint and model.actuator_forcelimited[actuator]:
-                largest = float(np.abs(model.actuator_forcerange[actuator]).max())
-                efforts.append(largest * abs(float(model.actuator_gear[actuator, 0])))
+            if driven and int(model.actuator_trnid[actuator, 0]) == joint:
+                largest = self._largest_force(actuator) * abs(float(model.actuator_gear[actuator, 0]))
+                efforts += [largest] if largest > 0.0 else []
         return min(efforts, default=0.0)
+
+    def _largest_force(self, actuator: int) -> float:
+        """Largest force of an actuator before its gear: its range, or that of a motor's control; 0 where none is."""
+        model, library = self._model, self._library
+        if model.actuator_forcelimited[actuator]:
+            return float(np.abs(model.actuator_forcerange[actuator]).max())
+        plain = int(model.actuator_gaintype[actuator]) == int(library.mjtGain.mjGAIN_FIXED)
+        plain &= int(model.actuator_biastype[actuator]) == int(library.mjtBias.mjBIAS_NONE)
+        if plain and model.actuator_ctrllimited[actuator]:
+            return float(np.abs(model.actuator_ctrlrange[actuator]).max() * abs(model.actuator_gainprm[actuator, 0]))
+        return 0.0
 
     def _couple(self) -> None:
         """Mimics of the equality constraints that couple two joints."""

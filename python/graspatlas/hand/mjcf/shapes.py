@@ -13,7 +13,7 @@ from graspatlas.hand.embedded_meshes import embed_mesh
 from graspatlas.hand.mesh_files import mesh_corners
 from graspatlas.hand.mjcf.names import Names
 from graspatlas.hand.robot_files import PACKAGE
-from graspatlas.numerics.rotations import rpy_from_matrix
+from graspatlas.numerics.rotations import matrix_from_quaternion, rpy_from_matrix
 from graspatlas.support.arrays import Array
 
 if TYPE_CHECKING:
@@ -35,13 +35,8 @@ KEPT = (".stl", ".obj")
 
 def pose(position: Array, quaternion: Array) -> Array:
     """Placement (4, 4) of a position (3,) and a quaternion w x y z (4,)."""
-    w, x, y, z = (float(part) for part in quaternion / np.linalg.norm(quaternion))
     T = np.eye(4)
-    T[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
+    T[:3, :3] = matrix_from_quaternion(quaternion[[1, 2, 3, 0]])
     T[:3, 3] = position
     return T
 

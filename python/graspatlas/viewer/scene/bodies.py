@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ from graspatlas.support.arrays import Array
 from graspatlas.viewer.scene.meshes import Mesh, from_shape
 from graspatlas.viewer.scene.stick_figure import Shape, bones, outlines
 
-__all__ = ["BodyShapes"]
+__all__ = ["BodyMeshes", "BodyShapes"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,37 +30,32 @@ class _Part:
     colour: tuple[float, float, float, float]
 
 
-class BodyShapes:
-    """Meshes of a problem's hand and object; each file is read once. What has none is sketched.
+class BodyMeshes:
+    """Meshes of a body; each file is read once. Those of its collision shapes where it has no visual ones.
 
     Args:
-        problem: The problem.
+        body: The body.
+
+    Attributes:
+        parts: The meshes, each on its link.
 
     Raises:
         GraspAtlasError: If a mesh cannot be read.
     """
 
-    def __init__(self, problem: Problem) -> None:
-        self._problem = problem
+    def __init__(self, body: Body) -> None:
         self._files: dict[tuple[str | float, ...], Mesh | None] = {}
-        self._hand = self._read(problem.hand)
-        self._object = self._read(problem.object)
+        self.parts = self._read(body)
 
-    def hand(self, q: Array) -> Iterator[Shape]:
-        """The hand at joint configuration q (nq,)."""
-        if not self._hand:
-            return bones(self._problem, q)
-        placements = self._problem.hand.link_placements(q)
-        return ((part.mesh, placements[part.link] @ part.T_link_shape, part.colour) for part in self._hand)
+    def on_links(self, placements: Mapping[str, Array]) -> Iterator[Shape]:
+        """The meshes with the links at some placements (4, 4)."""
+        return ((part.mesh, placements[part.link] @ part.T_link_shape, part.colour) for part in self.parts)
 
-    def object(self) -> Iterator[Shape]:
-        """The object in its own frame."""
-        if not self._object:
-            return outlines(self._problem)
-        return ((part.mesh, part.T_root_shape, part.colour) for part in self._object)
+    def at_rest(self) -> Iterator[Shape]:
+        """The meshes with all joints at 0, in the frame of the root."""
+        return ((part.mesh, part.T_root_shape, part.colour) for part in self.parts)
 
     def _read(self, body: Body) -> list[_Part]:
-        """The meshes of a body; its collision shapes where it has no visual ones."""
         check_meshes(body)
         try:
             tables = _core.read_visual_shapes(body.tree, body.urdf, list(mesh_folders(body)))
@@ -87,3 +82,28 @@ class BodyShapes:
         if key not in self._files:
             self._files[key] = from_shape(*shape)
         return self._files[key]
+
+
+class BodyShapes:
+    """Meshes of a problem's hand and object. What has none is sketched.
+
+    Args:
+        problem: The problem.
+
+    Raises:
+        GraspAtlasError: If a mesh cannot be read.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        self._hand, self._object = BodyMeshes(problem.hand), BodyMeshes(problem.object)
+
+    def hand(self, q: Array) -> Iterator[Shape]:
+        """The hand at joint configuration q (nq,)."""
+        if not self._hand.parts:
+            return bones(self._problem, q)
+        return self._hand.on_links(self._problem.hand.link_placements(q))
+
+    def object(self) -> Iterator[Shape]:
+        """The object in its own frame."""
+        return self._object.at_rest() if self._object.parts else outlines(self._problem)

@@ -46,9 +46,19 @@ COLOURS: dict[str, Colour] = {
     "ellipsoid": (0.56, 0.20, 0.88, 0.24),
     "force": (1.0, 0.50, 0.0, 1.0),
     "push": (0.56, 0.20, 0.88, 1.0),
+    "pad": (0.02, 0.50, 0.46, 1.0),
+    "object normal": (0.10, 0.30, 0.85, 1.0),
 }
 #: How much of them shows through what hides them.
-SHOW_THROUGH = {"contact": 0.9, "normal": 0.8, "ellipsoid": 0.22, "force": 0.8, "push": 0.7}
+SHOW_THROUGH = {
+    "contact": 0.9,
+    "normal": 0.8,
+    "ellipsoid": 0.22,
+    "force": 0.8,
+    "push": 0.7,
+    "pad": 0.35,
+    "object normal": 0.8,
+}
 #: Sizes of contact points and arrows, and the longest semi-axis that an ellipsoid is drawn with [m].
 CONTACT_RADIUS = 0.0042
 NORMAL_LENGTH = 0.042

@@ -47,8 +47,9 @@ def bones(problem: Problem, q: Array) -> Iterator[Shape]:
 
 
 def bone_length(problem: Problem) -> float:
-    """Mean length of the hand's bones at x1, metres."""
-    lines = _skeleton(problem, problem.x1_array[: problem.hand.model.hand_q_size])[1]
+    """Mean length of the hand's bones at x1, or with all joints at 0 where there is none, metres."""
+    n = problem.hand.model.hand_q_size
+    lines = _skeleton(problem, (problem.x1_array if problem.x1 else np.asarray(problem.hand.model.neutral))[:n])[1]
     return float(np.mean([np.linalg.norm(end - start) for start, end in lines]))
 
 
