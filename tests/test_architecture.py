@@ -17,7 +17,20 @@ NAME = "graspatlas"
 #: The floors from the lowest to the highest: packages, and files that lie beside them. Each may import those below it.
 FLOORS = (
     *("_core", "version", "errors", "start_up", "libraries", "doctor"),
-    *("support", "storage", "numerics", "cluster", "systems", "patches", "hand", "problem", "collision", "execution"),
+    *(
+        "support",
+        "storage",
+        "numerics",
+        "cluster",
+        "systems",
+        "meshes",
+        "patches",
+        "regions",
+        "hand",
+        "problem",
+        "collision",
+        "execution",
+    ),
     *("atlas", "grasps", "search", "quality", "requirements"),
     *(
         "testing",

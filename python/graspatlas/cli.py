@@ -24,6 +24,7 @@ __all__ = ["main"]
 COMMANDS = {
     "listing": ("list", "doctor"),
     "problem": ("new", "check", "schema"),
+    "regions": ("regions",),
     "optimize": ("optimize",),
     "ladder": ("ladder",),
     "result": ("view", "export", "check-result"),

@@ -63,8 +63,8 @@ def _inside_out(mesh: TriangleMesh, against: BoolArray, piece: IntArray, count: 
     normals = cross_products(mesh.corners) * np.where(against, -0.5, 0.5)[:, None]
     areas = np.bincount(piece, mesh.areas, count)
     middle = np.stack([np.bincount(piece, mesh.areas * mesh.centers[:, k], count) for k in range(3)], axis=1)
-    middle /= areas[:, None]
-    volumes = np.bincount(piece, np.einsum("nk,nk->n", normals, mesh.centers - middle[piece]), count) / 3.0
+    arms = mesh.centers - (middle / areas[:, None])[piece]
+    volumes = np.bincount(piece, np.einsum("nk,nk->n", normals, arms), count) / 3.0
     inverted = np.asarray(volumes < -THINNEST * areas**1.5)
     for k in np.flatnonzero(inverted)[:MOST_NESTED] if count > 1 else ():
         inverted[k] = not _is_cavity(mesh, piece, int(k))
@@ -102,7 +102,9 @@ def unfolded(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     both = np.r_[i, j], np.r_[j, i]
     turned = np.einsum("nk,nk->n", normals[both[0]], normals[both[1]]) < FOLDED
     against = np.bincount(both[0], turned, len(areas))
-    around = np.bincount(both[0], areas[both[1]], len(areas)) / np.maximum(np.bincount(both[0], minlength=len(areas)), 1)
+    around = np.bincount(both[0], areas[both[1]], len(areas)) / np.maximum(
+        np.bincount(both[0], minlength=len(areas)), 1
+    )
     folded = np.flatnonzero((against >= 2) & (areas < SLIVER * around))
     if len(folded) == 0 or len(folded) > MOST_FOLDS:
         return mesh, 0

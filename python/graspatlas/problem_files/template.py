@@ -12,6 +12,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.hand import Hand
 from graspatlas.hand.robot_files import described_robot, example_robot, find_file
 from graspatlas.patches.registry import patch_types
+from graspatlas.problem_files.mesh_patches import MADE_OF_MESHES
 from graspatlas.problem_files.reading import FILL_IN
 from graspatlas.storage.files import is_file
 
@@ -111,7 +112,7 @@ def problem_template(urdf: str, object_file: str | None = None, *, folder: Path 
 
 
 def _contact() -> str:
-    return _CONTACT.format(blank=FILL_IN, kinds=", ".join(cls.kind for cls in patch_types()))
+    return _CONTACT.format(blank=FILL_IN, kinds=", ".join([*(cls.kind for cls in patch_types()), *MADE_OF_MESHES]))
 
 
 def _hand(urdf: str, folder: Path | None) -> tuple[Hand, str]:

@@ -16,7 +16,7 @@ WIDEST_GAP = 0.21
 CELLS, PER_CELL = 24, 60
 #: A cell belongs to a region when it has this share of the samples of the cells beside it.
 FILLED = 0.5
-#: Of rectangles that have this share of the largest one's area, the one nearest to the middle and to the shape is taken.
+#: Of rectangles with this share of the largest one's area, the one nearest to the middle and to the shape is taken.
 ABOUT_LARGEST = 0.95
 
 
@@ -47,7 +47,8 @@ def within(
     Args:
         surface: The surface.
         points: Points spread evenly over the region (n, 3), about ``CELLS**2 * PER_CELL``.
-        u, v: Intervals that cover it; None for the circle.
+        u: Interval of u that covers it; None for the circle.
+        v: The same of v.
     """
     counts = _counts(surface, points, u, v, CELLS)
     typical = np.array([np.median(row[row > 0]) if (row > 0).any() else 1.0 for row in counts.T])

@@ -240,5 +240,3 @@ def _lloyd(features: Array, count: int) -> tuple[Array, IntArray]:
             [features[label == k].mean(axis=0) if (label == k).any() else centers[k] for k in range(count)]
         )
     return centers, label
-
-

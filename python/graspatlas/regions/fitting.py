@@ -9,9 +9,9 @@ import numpy as np
 
 from graspatlas.patches.spline import clamped_knots
 from graspatlas.regions.surfaces import Ball, Flat, Graph, Outline, Surface, Turned, frame_about
-from graspatlas.support.arrays import Array, BoolArray
+from graspatlas.support.arrays import Array, BoolArray, IndexArray, IntArray
 
-__all__ = ["Samples", "fitted_ball", "fitted_flat", "fitted_round", "fits", "rough_round", "simplest_surface"]
+__all__ = ["Samples", "fits", "fitted_ball", "fitted_flat", "fitted_round", "rough_round", "simplest_surface"]
 
 #: Shares of the area that must lie within the tolerance, and whose normals must agree.
 WITHIN, AGREEING = 0.98, 0.95
@@ -45,9 +45,9 @@ class Samples:
 
     points: Array
     normals: Array
-    faces: Array
+    faces: IntArray
 
-    def __getitem__(self, which: Array | BoolArray | slice) -> Samples:
+    def __getitem__(self, which: IntArray | BoolArray | IndexArray) -> Samples:
         return Samples(self.points[which], self.normals[which], self.faces[which])
 
     def __len__(self) -> int:
@@ -370,9 +370,7 @@ def _graph(middle: Array, axes: Array, local: Array, half: Array, counts: list[i
     from scipy.interpolate import BSpline  # slow to import
 
     knots = [clamped_knots(n, 3, -float(h), float(h)) for n, h in zip(counts, half, strict=True)]
-    U, V = (
-        BSpline.design_matrix(np.clip(local[:, i], -half[i], half[i]), knots[i], 3).toarray() for i in range(2)
-    )
+    U, V = (BSpline.design_matrix(np.clip(local[:, i], -half[i], half[i]), knots[i], 3).toarray() for i in range(2))
     A = np.einsum("ni,nj->nij", U, V).reshape(len(local), -1)
     D, E = (np.diff(np.eye(n), 2, axis=0) for n in counts)
     bends = np.kron(D.T @ D, np.eye(counts[1])) + np.kron(np.eye(counts[0]), E.T @ E)

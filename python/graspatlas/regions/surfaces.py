@@ -128,7 +128,7 @@ class Ball(Surface):
         """Directions from the centre, or to it."""
         out = points - self.center
         out = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300)
-        return -out if self.flipped else out
+        return np.asarray(-out if self.flipped else out)
 
     def parameters(self, points: Array) -> Array:
         """Longitudes and latitudes."""
@@ -183,7 +183,7 @@ class Outline:
         """Parameter v of the nearest points: a height, or an angle about the tube."""
         if self.kind == "torus":
             return np.asarray(np.arctan2(h - self.heights[0], r - self.radii[0]))
-        along, across = self.normals(h, r)
+        along, _ = self.normals(h, r)
         return np.asarray(h - along * self.distances(h, r)) if self.kind == "cone" else h
 
     def radius(self, h: Array) -> tuple[Array, Array]:
@@ -236,7 +236,7 @@ class Turned(Surface):
         along, across = self.outline.normals(h, r)
         share = across / np.maximum(r, 1e-300)
         out = np.column_stack([share * x, along, share * z]) @ self.axes.T
-        return -out if self.flipped else out
+        return np.asarray(-out if self.flipped else out)
 
     def regular(self, points: Array) -> BoolArray:
         """Where the radius is neither small nor steep by height."""
@@ -347,13 +347,15 @@ class Graph(Surface):
     def patch(self, u: Interval | None, v: Interval) -> Patch:
         """A B-spline, whose control points lie over the means of its knots (Greville's abscissae)."""
         means = [
-            np.lib.stride_tricks.sliding_window_view(knots[1:-1], 3).mean(axis=1) for knots in (self.u_knots, self.v_knots)
+            np.lib.stride_tricks.sliding_window_view(knots[1:-1], 3).mean(axis=1)
+            for knots in (self.u_knots, self.v_knots)
         ]
         x, y = np.meshgrid(*means, indexing="ij")
         points = np.stack([x, y, self.net], axis=-1) @ self.axes.T + self.origin
         ends = [(float(k[3]), float(k[-4])) for k in (self.u_knots, self.v_knots)]
         kept = [
-            (max(low, least), min(high, most)) for (low, high), (least, most) in zip((u or ends[0], v), ends, strict=True)
+            (max(low, least), min(high, most))
+            for (low, high), (least, most) in zip((u or ends[0], v), ends, strict=True)
         ]
         return BSpline(
             control_points=tuple(tuple(vector(p) for p in row) for row in points),
