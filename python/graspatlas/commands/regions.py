@@ -53,7 +53,11 @@ def _regions(options: argparse.Namespace) -> int:
         crease=CREASE if options.crease is None else float(np.radians(options.crease)),
         smallest=SMALLEST if options.smallest is None else options.smallest,
     )
-    data = {"mesh": str(options.mesh), "repair": str(report), "regions": [region.to_dict() for region in regions]}
+    data: PlainTable = {
+        "mesh": str(options.mesh),
+        "repair": str(report),
+        "regions": [region.to_dict() for region in regions],
+    }
     if options.json:
         say(json.dumps(data))
     else:
@@ -86,8 +90,8 @@ def _list(regions: tuple[Region, ...], area: float) -> None:
     for region in regions:
         (x, y, z), (largest, rms) = region.center, region.error
         say(
-            f"{region.name:{width}}  {1e4 * region.area:10.4g}  {1e3 * largest:14.3g} {1e3 * rms:14.3g}"
-            f"  {100.0 * region.filled:5.0f}%  ({x:.4g}, {y:.4g}, {z:.4g})"
+            f"{region.name:{width}}  {1e4 * region.area:10.4g}  {1e3 * largest:14.3f} {1e3 * rms:14.3f}"
+            f"  {100.0 * region.filled:5.0f}%  ({x + 0.0:.4f}, {y + 0.0:.4f}, {z + 0.0:.4f})"
         )
     share = 100.0 * sum(region.area for region in regions) / area
     say(f"{len(regions)} region{'s' if len(regions) != 1 else ''} with {share:.4g} % of the area")

@@ -12,7 +12,7 @@ __all__ = ["smooth_normals"]
 #: Neighbours whose normals make this angle [rad] count a third of those that agree: 20 degrees.
 LIKE = 0.35
 #: How often normals are averaged with those of neighbouring faces, at least and at most.
-ROUNDS = (3, 25)
+ROUNDS = (3, 12)
 #: A mesh is noisy when half of all neighbouring faces make a larger angle [rad]: 8 degrees.
 NOISY = np.radians(8.0)
 

@@ -203,8 +203,8 @@ class RegionTable(OnMeshTable):
     )
     whole: bool = Field(
         False,
-        description="True for the patch that covers the region, whose corners may lie beside it; by default the largest "
-        "rectangle of u and v that lies on the region.",
+        description="True for the patch that covers the region, whose corners may lie beside it; otherwise the largest "
+        "rectangle of u and v that lies on the region is taken.",
     )
 
 

@@ -16,6 +16,8 @@ WIDEST_GAP = 0.21
 CELLS, PER_CELL = 24, 60
 #: A cell belongs to a region when it has this share of the samples of the cells beside it.
 FILLED = 0.5
+#: A part that bends fills this share of the rectangle of u and v around it, or it is cut again.
+FILLED_PART = 0.4
 #: Of rectangles with this share of the largest one's area, the one nearest to the middle and to the shape is taken.
 ABOUT_LARGEST = 0.95
 
@@ -94,7 +96,7 @@ def _longest_run(values: BoolArray) -> tuple[int, int]:
     return int(steps[2 * k]), int(steps[2 * k + 1])
 
 
-def filled(surface: Surface, points: Array, cells: int = 10) -> float:
+def filled(surface: Surface, points: Array, cells: int = 14) -> float:
     """The share of the cells of the covering rectangle that hold one of the points, about."""
     return float((_counts(surface, points, *covering(surface, points), cells) > 0).mean())
 

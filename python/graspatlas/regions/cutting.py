@@ -10,9 +10,9 @@ import numpy as np
 
 from graspatlas.meshes.smoothing import smooth_normals
 from graspatlas.meshes.triangles import TriangleMesh
-from graspatlas.regions.covering import filled
+from graspatlas.regions.covering import FILLED_PART, filled
 from graspatlas.regions.extraction import extracted
-from graspatlas.regions.fitting import STEEPEST, Samples, simplest_surface
+from graspatlas.regions.fitting import STEEPEST, Samples, lying_on, simplest_surface
 from graspatlas.regions.sampling import spread
 from graspatlas.regions.surfaces import Surface
 from graspatlas.support.arrays import Array, IntArray
@@ -21,14 +21,14 @@ __all__ = ["Cutting", "Part"]
 
 #: Samples of a part of the mesh.
 SAMPLES = 1500
-#: A face belongs to a surface when its corners and centroid lie within so many tolerances, and its normal so near.
-NEAR, ALIKE = 1.5, np.radians(35.0)
+#: A face belongs to a surface when its corners and centroid lie within the tolerance, and its normal so near [rad].
+ALIKE = np.radians(35.0)
+#: Fewest samples that a surface is fitted to.
+LEAST = 30
 #: Normals are smoothed over this share of the mesh's diagonal.
 SMOOTHED = 0.01
 #: A part has its own tolerance where it is small: this share of the side of a square as large.
 RELATIVE_TOLERANCE = 0.05
-#: A part that bends fills this share of the rectangle of u and v around it, or it is cut again.
-FILLED = 0.4
 #: How often parts are cut again.
 DEEPEST = 6
 #: How often faces at its rim may join a part.
@@ -131,7 +131,8 @@ class Cutting:
     def _fitted(self, faces: IntArray, surface: Surface, tolerance: float, deeper: int) -> Iterator[Part]:
         """A part that lies on a surface, as a whole, or in parts where it fills little of its rectangle."""
         samples = self.samples(faces)
-        found = simplest_surface(samples, tolerance) or surface
+        kept = samples[lying_on(surface, samples, tolerance)]
+        found = (simplest_surface(kept, tolerance, freeform=False) if len(kept) > LEAST else None) or surface
         if _fills(found, samples):
             yield self._trimmed(faces, found, tolerance)
         elif deeper > 0:
@@ -148,7 +149,7 @@ class Cutting:
         gaps = np.maximum(gaps[: 3 * len(faces)].reshape(-1, 3).max(axis=1), gaps[3 * len(faces) :]) / tolerance
         cosines = np.einsum("nk,nk->n", surface.normals(self.mesh.centers[faces]), self.normals[faces])
         turns = np.arccos(np.clip(cosines, -1.0, 1.0))
-        fit = (gaps <= NEAR) & (turns <= ALIKE) & surface.regular(self.mesh.centers[faces])
+        fit = (gaps <= 1.0) & (turns <= ALIKE) & surface.regular(self.mesh.centers[faces])
         return np.where(fit, gaps**2 + (turns / ALIKE * 2.0) ** 2, np.inf)
 
     def _nearest(self, faces: IntArray, surfaces: list[Surface], tolerance: float) -> IntArray:
@@ -202,7 +203,7 @@ class Cutting:
             for k in np.unique(wanted):
                 faces = np.unique(sought[wanted == k])
                 faces = faces[owner[faces] < 0]
-                tolerance = self.tolerance_of(parts[k].faces) / NEAR
+                tolerance = self.tolerance_of(parts[k].faces)
                 owner[faces[np.isfinite(self._misfit(faces, parts[k].surface, tolerance))]] = k
         order = np.argsort(owner, kind="stable")
         ends = np.searchsorted(owner[order], np.arange(len(parts) + 1))
@@ -212,7 +213,7 @@ class Cutting:
 
 def _fills(surface: Surface, samples: Samples) -> bool:
     """Whether a part fills enough of the rectangle of u and v around it; flats do without."""
-    return surface.kind == "plane" or filled(surface, samples.points) > FILLED
+    return surface.kind == "plane" or filled(surface, samples.points) > FILLED_PART
 
 
 def _turn(normals: Array) -> float:

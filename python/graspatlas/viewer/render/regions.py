@@ -72,7 +72,7 @@ def _legend(regions: Sequence[Region], colours: Sequence[Colour], width: int, he
     """Rows of coloured dots with names, areas and errors."""
     size = max(height / 52.0, 9.0)
     entries = [
-        (colour, f"{r.name}  {1e4 * r.area:.3g} cm², {1e3 * r.error[0]:.2g} mm")
+        (colour, f"{r.name}  {1e4 * r.area:.3g} cm2, {1e3 * r.error[0]:.2f} mm")
         for r, colour in list(zip(regions, colours, strict=True))[:MOST_NAMED]
     ]
     rows: list[Image.Image] = []
