@@ -15,6 +15,7 @@ from graspatlas.regions.extraction import extracted
 from graspatlas.regions.fitting import STEEPEST, Samples, lying_on, simplest_surface
 from graspatlas.regions.sampling import spread
 from graspatlas.regions.surfaces import Surface
+from graspatlas.regions.tubes import fitted_tube
 from graspatlas.support.arrays import Array, IntArray
 
 __all__ = ["Cutting", "Part"]
@@ -113,7 +114,7 @@ class Cutting:
             return
         if deeper == 0:
             return
-        surfaces = [] if whole else extracted(samples, tolerance, self.smallest / self.mesh.areas[faces].sum())
+        surfaces = [] if whole else self._surfaces(faces, samples, tolerance)
         labels = np.full(len(self.mesh.faces), -1)
         if surfaces:
             labels[faces] = self._nearest(faces, surfaces, tolerance)
@@ -127,6 +128,13 @@ class Cutting:
             labels[faces] = self._clusters(faces, samples)
         for group in self._groups(labels):
             yield from self._cut(group, deeper - 1, whole=bool(surfaces))
+
+    def _surfaces(self, faces: IntArray, samples: Samples, tolerance: float) -> list[Surface]:
+        """Surfaces that parts of some faces lie on; else the tube that they are."""
+        least = self.smallest / float(self.mesh.areas[faces].sum())
+        found = extracted(samples, tolerance, least)
+        tube = None if found else fitted_tube(samples, tolerance)
+        return found if tube is None else [tube]
 
     def _fitted(self, faces: IntArray, surface: Surface, tolerance: float, deeper: int) -> Iterator[Part]:
         """A part that lies on a surface, as a whole, or in parts where it fills little of its rectangle."""
