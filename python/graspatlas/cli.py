@@ -22,9 +22,8 @@ __all__ = ["main"]
 
 #: Modules of ``commands`` and the commands that they add, in the order in which help lists them.
 COMMANDS = {
-    "listing": ("list", "doctor"),
+    "listing": ("list", "doctor", "regions"),
     "problem": ("new", "check", "schema"),
-    "regions": ("regions",),
     "optimize": ("optimize",),
     "ladder": ("ladder",),
     "result": ("view", "export", "check-result"),

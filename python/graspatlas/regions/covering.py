@@ -60,7 +60,9 @@ def within(
     for interval, a, b in ((u, i0, i1), (v, j0, j1)):
         low, high = interval or (-np.pi, np.pi)
         cell = (high - low) / CELLS
-        found.append(None if interval is None and b - a == CELLS else (low + a * cell, low + b * cell))
+        inset = min(0.5, 0.25 * (b - a))  # cells at the rim are full in part
+        start, end = (a + inset * (a > 0 or interval is None), b - inset * (b < CELLS or interval is None))
+        found.append(None if interval is None and b - a == CELLS else (low + start * cell, low + end * cell))
     return found[0], found[1], float(full.mean())
 
 

@@ -32,6 +32,10 @@ SMOOTHED = 0.01
 RELATIVE_TOLERANCE = 0.05
 #: How often parts are cut again.
 DEEPEST = 6
+#: A part is one with a larger one when this share of so many samples lies on the surface of that one ...
+SAME, FEW = 0.9, 200
+#: ... and the two are no farther apart than this share of the mesh's diagonal.
+BESIDE = 0.02
 #: How often faces at its rim may join a part.
 JOINED = 8
 #: Numbers of parts into which a bent part is cut, and rounds of Lloyd's algorithm.
@@ -79,7 +83,7 @@ class Cutting:
     def parts(self) -> list[Part]:
         """The parts, with what joins them at their rims."""
         charts = self._groups(np.zeros(len(self.mesh.faces), np.int64))
-        return self._joined([part for chart in charts for part in self._cut(chart, DEEPEST)])
+        return self._joined(self._merged([part for chart in charts for part in self._cut(chart, DEEPEST)]))
 
     def samples(self, faces: IntArray, count: int = SAMPLES) -> Samples:
         """Samples of some faces."""
@@ -196,6 +200,27 @@ class Cutting:
             votes[np.arange(len(labels)), labels] += 0.5
             labels = np.argmax(votes, axis=1)
         return labels
+
+    def _merged(self, parts: list[Part]) -> list[Part]:
+        """Parts of which each holds those beside it, cut off by noise, that lie on its surface too."""
+        from scipy.spatial import cKDTree  # slow to import
+
+        rest = sorted(parts, key=lambda part: -float(self.mesh.areas[part.faces].sum()))
+        merged: list[Part] = []
+        while rest:
+            part, others = rest[0], []
+            tolerance = self.tolerance_of(part.faces)
+            tree = cKDTree(self.mesh.centers[part.faces])
+            for other in rest[1:]:
+                samples = self.samples(other.faces, FEW)
+                apart = tree.query(self.mesh.centers[other.faces])[0].min()
+                if apart > BESIDE * self.mesh.diagonal or lying_on(part.surface, samples, tolerance).mean() < SAME:
+                    others.append(other)
+                    continue
+                part = self._trimmed(np.concatenate([part.faces, other.faces]), part.surface, tolerance)
+            merged.append(part)
+            rest = others
+        return merged
 
     def _joined(self, parts: list[Part]) -> list[Part]:
         """Parts with faces at their rims that fit them too and that no part has."""
