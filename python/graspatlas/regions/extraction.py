@@ -12,8 +12,9 @@ from graspatlas.support.arrays import Array, BoolArray, IntArray
 
 __all__ = ["extracted"]
 
-#: Places at which surfaces are tried, and the shares of the samples that are their surroundings.
-SEEDS, SURROUNDINGS = 20, (0.02, 0.06, 0.18)
+#: Fewest and most places at which surfaces are tried, as many as there is room for regions, and the shares of the
+#: samples that are their surroundings.
+SEEDS, SURROUNDINGS = (6, 20), (0.02, 0.06, 0.18)
 #: Normals of the surroundings make at most this angle with the seed's, in cosines: 70 degrees.
 FACING = 0.34
 #: Kinds of round surfaces that are tried, the simplest first.
@@ -46,14 +47,15 @@ def extracted(samples: Samples, tolerance: float, least: float) -> list[Surface]
     Source: after R. Schnabel, R. Wahl, R. Klein, "Efficient RANSAC for point-cloud shape detection", CGF 26(2), 2007.
     """
     found: list[Surface] = []
-    rest, candidates, fresh = samples, _candidates(samples, tolerance), True
+    seeds = int(np.clip(1.0 / least, *SEEDS))
+    rest, candidates, fresh = samples, _candidates(samples, tolerance, seeds), True
     least_count = max(least * len(samples), FEWEST)
     while len(found) < MOST and len(rest) > least_count:
         best = _largest(rest, candidates, tolerance, least_count)
         if best is None:
             if fresh:
                 break
-            candidates, fresh = _candidates(rest, tolerance), True
+            candidates, fresh = _candidates(rest, tolerance, seeds), True
             continue
         fresh = False
         surface, inside = best
@@ -90,19 +92,19 @@ def _largest(
     return surface, inside
 
 
-def _candidates(samples: Samples, tolerance: float) -> list[tuple[int, Surface]]:
+def _candidates(samples: Samples, tolerance: float, seeds: int) -> list[tuple[int, Surface]]:
     """Surfaces that are tried, with the number of their kind, 0 for planes."""
-    return [*_of_surroundings(samples), *_of_all(samples, tolerance)]
+    return [*_of_surroundings(samples, seeds), *_of_all(samples, tolerance)]
 
 
-def _of_surroundings(samples: Samples) -> list[tuple[int, Surface]]:
+def _of_surroundings(samples: Samples, seeds: int) -> list[tuple[int, Surface]]:
     """Surfaces of the surroundings of seeds."""
     from scipy.spatial import cKDTree  # slow to import
 
     features = np.column_stack([2.0 * samples.points / max(samples.size, 1e-12), samples.normals])
     tree = cKDTree(samples.points)
     found: list[tuple[int, Surface]] = []
-    for seed in _far_apart(features, SEEDS):
+    for seed in _far_apart(features, seeds):
         for share in SURROUNDINGS:
             count = min(max(15, round(share * len(samples))), len(samples))
             near = np.atleast_1d(tree.query(samples.points[seed], count)[1])
