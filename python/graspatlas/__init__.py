@@ -42,6 +42,7 @@ if typing.TYPE_CHECKING:
     from graspatlas.hand.body import Body
     from graspatlas.hand.hand import Hand
     from graspatlas.hand.motions import HandMotions
+    from graspatlas.meshes.repair import Repair, repaired
     from graspatlas.optimizer.components import Components, SearchStatus, find_components
     from graspatlas.optimizer.ladder import ladder
     from graspatlas.optimizer.ladder_outcome import Ladder
@@ -57,6 +58,8 @@ if typing.TYPE_CHECKING:
     from graspatlas.problem.problem import Problem
     from graspatlas.problems import bundled_problems, load_problem
     from graspatlas.quality.batched import batched
+    from graspatlas.regions.find import find_regions
+    from graspatlas.regions.region import Region
     from graspatlas.requirements.collision_free import CollisionFree
     from graspatlas.requirements.force_closure import ForceClosure
     from graspatlas.requirements.holding_force import HoldingForce
@@ -115,6 +118,8 @@ __all__ = [
     "Problem",
     "Recording",
     "Refinement",
+    "Region",
+    "Repair",
     "Result",
     "Rung",
     "Samples",
@@ -134,6 +139,7 @@ __all__ = [
     "find_components",
     "find_grasps",
     "find_pads",
+    "find_regions",
     "ladder",
     "load_problem",
     "load_result",
@@ -159,6 +165,7 @@ __all__ = [
     "quality",
     "record",
     "refine",
+    "repaired",
     "save_picture",
     "shortest_path",
     "simulate",
@@ -188,6 +195,7 @@ _HOMES: dict[str, tuple[str, ...]] = {
     "hand.body": ("Body",),
     "hand.hand": ("Hand",),
     "hand.motions": ("HandMotions",),
+    "meshes.repair": ("Repair", "repaired"),
     "optimizer.components": ("Components", "SearchStatus", "find_components"),
     "optimizer.ladder": ("ladder",),
     "optimizer.ladder_outcome": ("Ladder",),
@@ -203,6 +211,8 @@ _HOMES: dict[str, tuple[str, ...]] = {
     "problem.problem": ("Problem",),
     "problems": ("bundled_problems", "load_problem"),
     "quality.batched": ("batched",),
+    "regions.find": ("find_regions",),
+    "regions.region": ("Region",),
     "requirements.collision_free": ("CollisionFree",),
     "requirements.force_closure": ("ForceClosure",),
     "requirements.holding_force": ("HoldingForce",),

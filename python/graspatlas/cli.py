@@ -23,7 +23,7 @@ __all__ = ["main"]
 
 #: Modules of ``commands`` and the commands that they add, in the order in which help lists them.
 COMMANDS = {
-    "listing": ("list", "doctor"),
+    "listing": ("list", "doctor", "regions"),
     "problem": ("new", "check", "schema", "pads"),
     "optimize": ("optimize",),
     "ladder": ("ladder",),

@@ -129,7 +129,9 @@ WRONG = {
     "over the edge": (lambda: grid_mesh(lambda x, y: 0.0 * x), (0.029, 0.0, 0.0), {}, "edge or a hole"),
     "over a hole": (with_hole, (0.0, 0.0, 0.0), {}, "edge or a hole"),
     "three sheets": (three_sheets, (0.005, 0.0, 0.0), {}, "not a manifold"),
-    "turned faces": (turned_faces, (0.0, -0.01, 0.0), {}, "not a manifold"),
+    "three sizes": (cylinder_mesh, ROUND, {"size": [0.01, 0.01, 0.01]}, "one length or two"),
+    "a size of text": (cylinder_mesh, ROUND, {"size": "large"}, "size must be a number"),
+    "a scale of zero": (cylinder_mesh, ROUND, {"scale": 0.0}, "scale must be a positive number"),
     "three control points": (cylinder_mesh, ROUND, {"control_points": 3}, "control_points must be"),
     "tolerance of text": (cylinder_mesh, ROUND, {"tolerance": "small"}, "tolerance must be a number"),
 }

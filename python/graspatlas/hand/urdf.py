@@ -25,6 +25,7 @@ __all__ = [
     "mesh_urdf",
     "mimics",
     "moving_joints",
+    "origin_of",
     "root_link",
     "sphere_urdf",
     "velocity_limits",
@@ -122,7 +123,7 @@ def center_of_mass(urdf: str) -> Array:
             parent, child = (_link_of(joint, side) for side in ("parent", "child"))
             if parent in placed and child not in placed:
                 R, at = placed[parent]
-                turned, moved = _origin(joint)
+                turned, moved = origin_of(joint)
                 placed[child] = R @ turned, at + R @ moved
     moment, total = np.zeros(3), 0.0
     for link in root.findall("link"):
@@ -131,7 +132,7 @@ def center_of_mass(urdf: str) -> Array:
         if inertial is None or not weight > 0.0 or str(link.get("name")) not in placed:
             continue
         R, at = placed[str(link.get("name"))]
-        moment, total = moment + weight * (at + R @ _origin(inertial)[1]), total + weight
+        moment, total = moment + weight * (at + R @ origin_of(inertial)[1]), total + weight
     return np.asarray(moment / total) if total > 0.0 else moment
 
 
@@ -141,7 +142,7 @@ def _link_of(joint: ElementTree.Element, side: str) -> str:
     return "" if element is None else str(element.get("link"))
 
 
-def _origin(element: ElementTree.Element) -> tuple[Array, Array]:
+def origin_of(element: ElementTree.Element) -> tuple[Array, Array]:
     """Rotation (3, 3) and translation (3,) [m] of the ``<origin>`` of a joint or inertial."""
     origin = element.find("origin")
     if origin is None:

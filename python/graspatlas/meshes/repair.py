@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -13,14 +14,16 @@ from graspatlas.meshes.triangles import TriangleMesh, cross_products
 from graspatlas.meshes.turning import turned_outwards, unfolded
 from graspatlas.numerics.groups import linked_groups
 from graspatlas.support.arrays import Array, IntArray
-from graspatlas.support.validation import positive
+from graspatlas.support.validation import positive, shown
 
 if TYPE_CHECKING:
     import trimesh
 
 Vector3 = tuple[float, float, float]
+#: From the unit of a mesh to metres: one number, or three along x, y and z.
+Scale: TypeAlias = "float | Sequence[float]"
 
-__all__ = ["Repair", "repaired", "repaired_triangles"]
+__all__ = ["Repair", "Scale", "checked_scale", "repaired", "repaired_triangles"]
 
 #: Vertices in the same cell of a grid this fine are one, as a share of the mesh's largest extent.
 SAME_PLACE = 1e-6
@@ -103,9 +106,8 @@ class Repair:
             (self.twisted, "faces without an outside"),
         )
         x, y, z = (1e3 * length for length in self.extents)
-        words = [
-            f"{self.faces} faces in {self.pieces} piece{'s' if self.pieces != 1 else ''}, {x:.4g} x {y:.4g} x {z:.4g} mm"
-        ]
+        pieces = f"{self.pieces} piece{'s' if self.pieces != 1 else ''}"
+        words = [f"{self.faces} faces in {pieces}, {x:.4g} x {y:.4g} x {z:.4g} mm"]
         words += [f"{count} {what}" for count, what in counts if count]
         words += ["watertight"] if self.watertight else [f"still {count} {what}" for count, what in left if count]
         if self.places:
@@ -113,7 +115,7 @@ class Repair:
         return "; ".join([*words, *([doubt] if (doubt := self.unit_doubt()) else [])])
 
 
-def repaired(mesh: AnyMesh, *, scale: float = 1.0) -> tuple[trimesh.Trimesh, Repair]:
+def repaired(mesh: AnyMesh, *, scale: Scale = 1.0) -> tuple[trimesh.Trimesh, Repair]:
     """A mesh made fit for use: with shared vertices, no face without area, and normals that point out.
 
     Vertices in one place are merged; faces without area or that stand twice are dropped; faces that are turned against
@@ -124,7 +126,7 @@ def repaired(mesh: AnyMesh, *, scale: float = 1.0) -> tuple[trimesh.Trimesh, Rep
 
     Args:
         mesh: A file that trimesh reads, or a ``trimesh.Trimesh``.
-        scale: From the mesh's unit to metres.
+        scale: From the mesh's unit to metres; one number, or three along x, y and z.
 
     Returns:
         The mesh in metres, and what was done.
@@ -136,12 +138,12 @@ def repaired(mesh: AnyMesh, *, scale: float = 1.0) -> tuple[trimesh.Trimesh, Rep
     return trimesh_library().Trimesh(whole.vertices, whole.faces, process=False), report
 
 
-def repaired_triangles(mesh: AnyMesh, scale: float = 1.0) -> tuple[TriangleMesh, Repair]:
+def repaired_triangles(mesh: AnyMesh, scale: Scale = 1.0) -> tuple[TriangleMesh, Repair]:
     """:func:`repaired` as arrays, with the numbers of the faces in the mesh that was given."""
-    positive(scale, "scale")
+    factors = checked_scale(scale)
     vertices, faces = read_mesh(mesh)
     given = len(faces)
-    whole, merged = _merged(scale * vertices, faces)
+    whole, merged = _merged(factors * vertices, faces)
     whole = _without_flat(whole)
     dropped = given - len(whole.faces)
     whole, turned, pieces, turned_pieces, twisted = turned_outwards(whole)
@@ -167,6 +169,19 @@ def repaired_triangles(mesh: AnyMesh, scale: float = 1.0) -> tuple[TriangleMesh,
         unit=_unit(float(extents.max())),
     )
     return whole, report
+
+
+def checked_scale(scale: Scale) -> Array:
+    """Scales along x, y and z (3,).
+
+    Raises:
+        GraspAtlasError: If they are not one positive number or three.
+    """
+    if isinstance(scale, Sequence | np.ndarray) and not isinstance(scale, str):
+        if len(scale) != 3:
+            raise GraspAtlasError(f"scale must be one number or three, along x, y and z, got {shown(scale)}")
+        return np.array([positive(factor, "scale") for factor in scale])
+    return np.full(3, positive(scale, "scale"))
 
 
 def _vector(place: Array) -> Vector3:

@@ -12,7 +12,7 @@ __all__ = ["smooth_normals"]
 #: Neighbours whose normals make this angle [rad] count a third of those that agree: 20 degrees.
 LIKE = 0.35
 #: How often normals are averaged with those of neighbouring faces, at least and at most.
-ROUNDS = (3, 25)
+ROUNDS = (3, 12)
 #: A mesh is noisy when half of all neighbouring faces make a larger angle [rad]: 8 degrees.
 NOISY = np.radians(8.0)
 
@@ -20,8 +20,8 @@ NOISY = np.radians(8.0)
 def smooth_normals(mesh: TriangleMesh, radius: float) -> Array:
     """Normals of the faces averaged over their surroundings, but not across edges (m, 3).
 
-    Vertices of a noisy mesh are drawn to the middle of their neighbours first. Each round replaces a normal by the mean over the face and its neighbours, weighted by area and, by a Gaussian, by how
-    little they turn.
+    Vertices of a noisy mesh are drawn to the middle of their neighbours first. Each round then replaces a normal by the
+    mean over the face and its neighbours, weighted by area and, by a Gaussian, by how little they turn.
 
     Args:
         mesh: The mesh.

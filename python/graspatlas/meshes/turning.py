@@ -63,8 +63,8 @@ def _inside_out(mesh: TriangleMesh, against: BoolArray, piece: IntArray, count: 
     normals = cross_products(mesh.corners) * np.where(against, -0.5, 0.5)[:, None]
     areas = np.bincount(piece, mesh.areas, count)
     middle = np.stack([np.bincount(piece, mesh.areas * mesh.centers[:, k], count) for k in range(3)], axis=1)
-    middle /= areas[:, None]
-    volumes = np.bincount(piece, np.einsum("nk,nk->n", normals, mesh.centers - middle[piece]), count) / 3.0
+    arms = mesh.centers - (middle / areas[:, None])[piece]
+    volumes = np.bincount(piece, np.einsum("nk,nk->n", normals, arms), count) / 3.0
     inverted = np.asarray(volumes < -THINNEST * areas**1.5)
     for k in np.flatnonzero(inverted)[:MOST_NESTED] if count > 1 else ():
         inverted[k] = not _is_cavity(mesh, piece, int(k))

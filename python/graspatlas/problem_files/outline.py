@@ -12,6 +12,7 @@ from graspatlas.hand.urdf import mimics, moving_joints
 from graspatlas.patches.registry import patch_types
 from graspatlas.problem.object_joint import FREE_FLYER, object_joint
 from graspatlas.problem_files import documents
+from graspatlas.problem_files.mesh_patches import MADE_OF_MESHES
 from graspatlas.storage.files import read_text
 
 __all__ = ["Outline", "read_outline"]
@@ -57,7 +58,7 @@ def _actuated_joints(hand: Mapping[str, Any], folder: Path | None) -> int:
 
 def _free_parameters(contact: Mapping[str, Any]) -> int:
     """How many patch parameters of a contact move."""
-    known = {cls.kind: cls.parameters for cls in patch_types()}
+    known = {cls.kind: cls.parameters for cls in patch_types()} | dict.fromkeys(MADE_OF_MESHES, ("u", "v"))
     sides = ((contact[side]["type"], contact.get(frozen, ())) for side, frozen in _SIDES)
     return sum(name not in frozen for kind, frozen in sides for name in known[kind])
 

@@ -16,7 +16,6 @@ from graspatlas.hand.hand import Hand
 from graspatlas.hand.motions import HandMotions, coupling_rows
 from graspatlas.hand.robot_files import described_robot, example_robot, find_file, is_mjcf
 from graspatlas.hand.urdf import mesh_urdf, moving_joints
-from graspatlas.patches.registry import patch_from_dict
 from graspatlas.problem.contacts import Contact
 from graspatlas.problem.first_grasp import FirstGrasp
 from graspatlas.problem.pose_guess import PoseGuess
@@ -24,6 +23,7 @@ from graspatlas.problem.problem import Problem
 from graspatlas.problem.requirement import StatedRequirement
 from graspatlas.problem_files import documents
 from graspatlas.problem_files.faults import ProblemFileError, faults_of_validation, narrowed, one_line
+from graspatlas.problem_files.mesh_patches import PatchesOfMeshes
 from graspatlas.problem_files.postures import read_postures
 from graspatlas.problem_files.schema import ContactTable, HandTable, MotionsTable, ObjectTable, ProblemTable
 from graspatlas.problem_files.schema_tables import Table
@@ -90,7 +90,8 @@ class _Reading:
         full, hand = self._hand(table.hand)
         with self._within("object"):
             body = self._object(table.object)
-        contacts = tuple(self._contact(i, contact, hand) for i, contact in enumerate(table.contacts))
+        meshes = PatchesOfMeshes(self.folder, tuple(table.object.package_paths), body, table.object.scale is not None)
+        contacts = tuple(self._contact(i, contact, hand, meshes) for i, contact in enumerate(table.contacts))
         guess = motions = x1 = None
         if table.object.pose_guess is not None:
             with self._within("object", "pose_guess"):
@@ -132,12 +133,12 @@ class _Reading:
             _ = hand.mechanism
             return full, hand
 
-    def _contact(self, i: int, table: ContactTable, hand: Hand) -> Contact:
+    def _contact(self, i: int, table: ContactTable, hand: Hand, meshes: PatchesOfMeshes) -> Contact:
         stated = self.document.data["contacts"][i]
         with self._within("contacts", i, "hand"):
-            on_hand = patch_from_dict(stated["hand"])
+            on_hand = meshes.patch(stated["hand"], on_object=False)
         with self._within("contacts", i, "object"):
-            on_object = patch_from_dict(stated["object"])
+            on_object = meshes.patch(stated["object"], on_object=True)
         with self._within("contacts", i):
             contact = Contact(table.frame, on_hand, on_object, table.frozen, table.hand_frozen)
             hand.frame(contact.frame)

@@ -177,12 +177,55 @@ class DefaultsTable(Table):
     )
 
 
+class OnMeshTable(Table):
+    """What is stated of a mesh and made a patch when the file is read."""
+
+    mesh: str | None = Field(
+        None, description="Path of a mesh file, absolute or relative to this file; that of the object by default."
+    )
+    scale: Positive | Scale | None = Field(None, description="From that mesh's unit to metres, such as 0.001.")
+
+
+class MeshPatchTable(OnMeshTable):
+    """A B-spline fitted to a mesh around a point."""
+
+    type: Literal["mesh_patch"]
+    center: Vector = Field(
+        description="Where, in the frame of the object or link [m]; the nearest point of the mesh counts."
+    )
+    size: Positive | Annotated[list[Positive], Field(min_length=2, max_length=2)] = Field(
+        description="How far it reaches from there along u and along v [m]: one number for both, or two."
+    )
+    u_axis: Vector = Field([1.0, 0.0, 0.0], description="Direction of u, made parallel to the tangent plane.")
+    control_points: Annotated[int, Field(ge=4, le=65)] = Field(
+        12, description="Number of control points along u and along v."
+    )
+    tolerance: Positive = Field(
+        0.02, description="Largest distance of the mesh from the patch, as a share of the size."
+    )
+
+
+class RegionTable(OnMeshTable):
+    """A region of a mesh, as graspatlas regions finds them."""
+
+    type: Literal["region"]
+    name: str = Field(description="Its name, such as cylinder_1; graspatlas regions MESH lists them.")
+    tolerance: Positive | None = Field(
+        None, description="Largest distance of a region from its patch [m]; 0.6 % of the mesh's diagonal by default."
+    )
+    whole: bool = Field(
+        False,
+        description="True for the patch that covers the region, whose corners may lie beside it; otherwise the largest "
+        "rectangle of u and v that lies on the region is taken.",
+    )
+
+
 def _patch_table() -> object:
     """A patch of any type; those that lie on another patch lie on one that does not."""
     on_patch = {cls for cls in patch_types() if Patch in get_type_hints(cls).values()}
     plain = [_typed(cls, None) for cls in patch_types() if cls not in on_patch]
     tables = plain + [_typed(cls, _one_of(plain)) for cls in patch_types() if cls in on_patch]
-    return _one_of(tables)
+    return _one_of([*tables, MeshPatchTable, RegionTable])
 
 
 def _one_of(tables: list[type[Table]]) -> object:

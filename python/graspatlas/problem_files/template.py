@@ -12,6 +12,7 @@ from graspatlas.hand.hand import Hand
 from graspatlas.hand.named_hands import named_hand
 from graspatlas.hand.robot_files import find_file, robots_folder
 from graspatlas.patches.registry import patch_types
+from graspatlas.problem_files.mesh_patches import MADE_OF_MESHES
 from graspatlas.problem_files.reading import FILL_IN
 
 __all__ = ["problem_template"]
@@ -114,7 +115,7 @@ def problem_template(
 
 
 def _contact() -> str:
-    return _CONTACT.format(blank=FILL_IN, kinds=", ".join(cls.kind for cls in patch_types()))
+    return _CONTACT.format(blank=FILL_IN, kinds=", ".join([*(cls.kind for cls in patch_types()), *MADE_OF_MESHES]))
 
 
 def _hand(word: str, folder: Path | None, root: str | None) -> tuple[Hand, str]:

@@ -16,7 +16,9 @@ WIDEST_GAP = 0.21
 CELLS, PER_CELL = 24, 60
 #: A cell belongs to a region when it has this share of the samples of the cells beside it.
 FILLED = 0.5
-#: Of rectangles that have this share of the largest one's area, the one nearest to the middle and to the shape is taken.
+#: A part that bends fills this share of the rectangle of u and v around it, or it is cut again.
+FILLED_PART = 0.4
+#: Of rectangles with this share of the largest one's area, the one nearest to the middle and to the shape is taken.
 ABOUT_LARGEST = 0.95
 
 
@@ -47,7 +49,8 @@ def within(
     Args:
         surface: The surface.
         points: Points spread evenly over the region (n, 3), about ``CELLS**2 * PER_CELL``.
-        u, v: Intervals that cover it; None for the circle.
+        u: Interval of u that covers it; None for the circle.
+        v: The same of v.
     """
     counts = _counts(surface, points, u, v, CELLS)
     typical = np.array([np.median(row[row > 0]) if (row > 0).any() else 1.0 for row in counts.T])
@@ -57,7 +60,9 @@ def within(
     for interval, a, b in ((u, i0, i1), (v, j0, j1)):
         low, high = interval or (-np.pi, np.pi)
         cell = (high - low) / CELLS
-        found.append(None if interval is None and b - a == CELLS else (low + a * cell, low + b * cell))
+        inset = min(0.5, 0.25 * (b - a))  # cells at the rim are full in part
+        start, end = (a + inset * (a > 0 or interval is None), b - inset * (b < CELLS or interval is None))
+        found.append(None if interval is None and b - a == CELLS else (low + start * cell, low + end * cell))
     return found[0], found[1], float(full.mean())
 
 
@@ -93,7 +98,7 @@ def _longest_run(values: BoolArray) -> tuple[int, int]:
     return int(steps[2 * k]), int(steps[2 * k + 1])
 
 
-def filled(surface: Surface, points: Array, cells: int = 10) -> float:
+def filled(surface: Surface, points: Array, cells: int = 14) -> float:
     """The share of the cells of the covering rectangle that hold one of the points, about."""
     return float((_counts(surface, points, *covering(surface, points), cells) > 0).mean())
 

@@ -10,27 +10,32 @@ import numpy as np
 
 from graspatlas.meshes.smoothing import smooth_normals
 from graspatlas.meshes.triangles import TriangleMesh
-from graspatlas.regions.covering import filled
+from graspatlas.regions.covering import FILLED_PART, filled
 from graspatlas.regions.extraction import extracted
-from graspatlas.regions.fitting import STEEPEST, Samples, simplest_surface
+from graspatlas.regions.fitting import STEEPEST, Samples, lying_on, simplest_surface
 from graspatlas.regions.sampling import spread
 from graspatlas.regions.surfaces import Surface
+from graspatlas.regions.tubes import fitted_tube
 from graspatlas.support.arrays import Array, IntArray
 
 __all__ = ["Cutting", "Part"]
 
 #: Samples of a part of the mesh.
 SAMPLES = 1500
-#: A face belongs to a surface when its corners and centroid lie within so many tolerances, and its normal so near.
-NEAR, ALIKE = 1.5, np.radians(35.0)
+#: A face belongs to a surface when its corners and centroid lie within the tolerance, and its normal so near [rad].
+ALIKE = np.radians(35.0)
+#: Fewest samples that a surface is fitted to.
+LEAST = 30
 #: Normals are smoothed over this share of the mesh's diagonal.
 SMOOTHED = 0.01
 #: A part has its own tolerance where it is small: this share of the side of a square as large.
 RELATIVE_TOLERANCE = 0.05
-#: A part that bends fills this share of the rectangle of u and v around it, or it is cut again.
-FILLED = 0.4
 #: How often parts are cut again.
 DEEPEST = 6
+#: A part is one with a larger one when this share of so many samples lies on the surface of that one ...
+SAME, FEW = 0.9, 200
+#: ... and the two are no farther apart than this share of the mesh's diagonal.
+BESIDE = 0.02
 #: How often faces at its rim may join a part.
 JOINED = 8
 #: Numbers of parts into which a bent part is cut, and rounds of Lloyd's algorithm.
@@ -78,7 +83,7 @@ class Cutting:
     def parts(self) -> list[Part]:
         """The parts, with what joins them at their rims."""
         charts = self._groups(np.zeros(len(self.mesh.faces), np.int64))
-        return self._joined([part for chart in charts for part in self._cut(chart, DEEPEST)])
+        return self._joined(self._merged([part for chart in charts for part in self._cut(chart, DEEPEST)]))
 
     def samples(self, faces: IntArray, count: int = SAMPLES) -> Samples:
         """Samples of some faces."""
@@ -113,7 +118,7 @@ class Cutting:
             return
         if deeper == 0:
             return
-        surfaces = [] if whole else extracted(samples, tolerance, self.smallest / self.mesh.areas[faces].sum())
+        surfaces = [] if whole else self._surfaces(faces, samples, tolerance)
         labels = np.full(len(self.mesh.faces), -1)
         if surfaces:
             labels[faces] = self._nearest(faces, surfaces, tolerance)
@@ -128,10 +133,18 @@ class Cutting:
         for group in self._groups(labels):
             yield from self._cut(group, deeper - 1, whole=bool(surfaces))
 
+    def _surfaces(self, faces: IntArray, samples: Samples, tolerance: float) -> list[Surface]:
+        """Surfaces that parts of some faces lie on; else the tube that they are."""
+        least = self.smallest / float(self.mesh.areas[faces].sum())
+        found = extracted(samples, tolerance, least)
+        tube = None if found else fitted_tube(samples, tolerance)
+        return found if tube is None else [tube]
+
     def _fitted(self, faces: IntArray, surface: Surface, tolerance: float, deeper: int) -> Iterator[Part]:
         """A part that lies on a surface, as a whole, or in parts where it fills little of its rectangle."""
         samples = self.samples(faces)
-        found = simplest_surface(samples, tolerance) or surface
+        kept = samples[lying_on(surface, samples, tolerance)]
+        found = (simplest_surface(kept, tolerance, freeform=False) if len(kept) > LEAST else None) or surface
         if _fills(found, samples):
             yield self._trimmed(faces, found, tolerance)
         elif deeper > 0:
@@ -148,7 +161,7 @@ class Cutting:
         gaps = np.maximum(gaps[: 3 * len(faces)].reshape(-1, 3).max(axis=1), gaps[3 * len(faces) :]) / tolerance
         cosines = np.einsum("nk,nk->n", surface.normals(self.mesh.centers[faces]), self.normals[faces])
         turns = np.arccos(np.clip(cosines, -1.0, 1.0))
-        fit = (gaps <= NEAR) & (turns <= ALIKE) & surface.regular(self.mesh.centers[faces])
+        fit = (gaps <= 1.0) & (turns <= ALIKE) & surface.regular(self.mesh.centers[faces])
         return np.where(fit, gaps**2 + (turns / ALIKE * 2.0) ** 2, np.inf)
 
     def _nearest(self, faces: IntArray, surfaces: list[Surface], tolerance: float) -> IntArray:
@@ -188,6 +201,27 @@ class Cutting:
             labels = np.argmax(votes, axis=1)
         return labels
 
+    def _merged(self, parts: list[Part]) -> list[Part]:
+        """Parts of which each holds those beside it, cut off by noise, that lie on its surface too."""
+        from scipy.spatial import cKDTree  # slow to import
+
+        rest = sorted(parts, key=lambda part: -float(self.mesh.areas[part.faces].sum()))
+        merged: list[Part] = []
+        while rest:
+            part, others = rest[0], []
+            tolerance = self.tolerance_of(part.faces)
+            tree = cKDTree(self.mesh.centers[part.faces])
+            for other in rest[1:]:
+                samples = self.samples(other.faces, FEW)
+                apart = tree.query(self.mesh.centers[other.faces])[0].min()
+                if apart > BESIDE * self.mesh.diagonal or lying_on(part.surface, samples, tolerance).mean() < SAME:
+                    others.append(other)
+                    continue
+                part = self._trimmed(np.concatenate([part.faces, other.faces]), part.surface, tolerance)
+            merged.append(part)
+            rest = others
+        return merged
+
     def _joined(self, parts: list[Part]) -> list[Part]:
         """Parts with faces at their rims that fit them too and that no part has."""
         owner = np.full(len(self.mesh.faces), -1)
@@ -202,7 +236,7 @@ class Cutting:
             for k in np.unique(wanted):
                 faces = np.unique(sought[wanted == k])
                 faces = faces[owner[faces] < 0]
-                tolerance = self.tolerance_of(parts[k].faces) / NEAR
+                tolerance = self.tolerance_of(parts[k].faces)
                 owner[faces[np.isfinite(self._misfit(faces, parts[k].surface, tolerance))]] = k
         order = np.argsort(owner, kind="stable")
         ends = np.searchsorted(owner[order], np.arange(len(parts) + 1))
@@ -212,7 +246,7 @@ class Cutting:
 
 def _fills(surface: Surface, samples: Samples) -> bool:
     """Whether a part fills enough of the rectangle of u and v around it; flats do without."""
-    return surface.kind == "plane" or filled(surface, samples.points) > FILLED
+    return surface.kind == "plane" or filled(surface, samples.points) > FILLED_PART
 
 
 def _turn(normals: Array) -> float:

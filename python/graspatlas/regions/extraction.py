@@ -4,27 +4,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from graspatlas.regions.fitting import SAME_NORMAL, Samples, fitted_flat, fitted_round, rough_round
+from graspatlas.regions.covering import FILLED_PART, filled
+from graspatlas.regions.fitting import Samples, fitted_flat, fitted_round, lying_on, rough_round
 from graspatlas.regions.sampling import connected, neighbours
 from graspatlas.regions.surfaces import Surface
 from graspatlas.support.arrays import Array, BoolArray, IntArray
 
 __all__ = ["extracted"]
 
-#: Places at which surfaces are tried, and the shares of the samples that are their surroundings.
-SEEDS, SURROUNDINGS = 20, (0.02, 0.06, 0.18)
+#: Fewest and most places at which surfaces are tried, as many as there is room for regions, and the shares of the
+#: samples that are their surroundings.
+SEEDS, SURROUNDINGS = (6, 20), (0.02, 0.06, 0.18)
 #: Normals of the surroundings make at most this angle with the seed's, in cosines: 70 degrees.
 FACING = 0.34
 #: Kinds of round surfaces that are tried, the simplest first.
 KINDS = ("cylinder", "sphere", "cone", "torus", "revolution")
 #: How many of these are tried on the surroundings of seeds; the others on all samples.
 LOCAL = 3
-#: Candidates that are fitted well.
-SHORT_LIST = 6
+#: Candidates of each kind that are fitted to all that lies on them, and the share of the best that these have.
+SHORT_LIST, PROMISING = 3, 0.5
 #: A surface is really there when this share of what lies within the tolerance lies within half of it.
 GENUINE = 0.8
 #: A simpler surface is taken if it has this share of what the largest one has.
 NEARLY = 0.9
+#: Fewest samples of a surface.
+FEWEST = 25
 #: Most surfaces of one piece.
 MOST = 16
 
@@ -43,47 +47,64 @@ def extracted(samples: Samples, tolerance: float, least: float) -> list[Surface]
     Source: after R. Schnabel, R. Wahl, R. Klein, "Efficient RANSAC for point-cloud shape detection", CGF 26(2), 2007.
     """
     found: list[Surface] = []
-    rest = samples
-    least_count = max(least * len(samples), 25.0)
+    seeds = int(np.clip(1.0 / least, *SEEDS))
+    rest, candidates, fresh = samples, _candidates(samples, tolerance, seeds), True
+    least_count = max(least * len(samples), FEWEST)
     while len(found) < MOST and len(rest) > least_count:
-        best = _largest(rest, tolerance, least_count)
+        best = _largest(rest, candidates, tolerance, least_count)
         if best is None:
-            break
+            if fresh:
+                break
+            candidates, fresh = _candidates(rest, tolerance, seeds), True
+            continue
+        fresh = False
         surface, inside = best
         found.append(surface)
         rest = rest[~inside]
     return found
 
 
-def _largest(samples: Samples, tolerance: float, least: float) -> tuple[Surface, BoolArray] | None:
+def _largest(
+    samples: Samples, candidates: list[tuple[int, Surface]], tolerance: float, least: float
+) -> tuple[Surface, BoolArray] | None:
     """The largest genuine surface among the samples, or a simpler one nearly as large, and its samples."""
     pairs = neighbours(samples)
-    rated = [(int(_inside(s, samples, tolerance).sum()), kind, s) for kind, s in _candidates(samples, tolerance)]
-    rated.sort(key=lambda item: -item[0])
-    short = [r for kind in range(len(KINDS) + 1) for r in [r for r in rated if r[1] == kind][:SHORT_LIST]]
-    short = [item for item in short if item[0] >= least]
+    rated = [(int(lying_on(s, samples, tolerance).sum()), kind, s) for kind, s in candidates]
+    enough = max(least, PROMISING * max(count for count, _, _ in rated))
+    rated = sorted((item for item in rated if item[0] >= enough), key=lambda item: -item[0])
     final = []
-    for _, kind, surface in short:
-        better = _settled(kind, surface, samples, pairs, tolerance)
-        if better is not None and better[1].sum() >= least:
-            final.append((kind, *better))
+    for number in range(len(KINDS) + 1):
+        for _, _, surface in [item for item in rated if item[1] == number][:SHORT_LIST]:
+            settled = _settled(number, surface, samples, pairs, tolerance)
+            if settled is not None and settled[1].sum() >= least:
+                final.append((number, *settled))
     if not final:
         return None
     most = max(int(inside.sum()) for _, _, inside in final)
     large = [item for item in final if item[2].sum() >= NEARLY * most]
-    simplest = min(kind for kind, _, _ in large)
-    _, surface, inside = max((item for item in large if item[0] == simplest), key=lambda item: int(item[2].sum()))
+    simplest = min(number for number, _, _ in large)
+    number, surface, inside = max((item for item in large if item[0] == simplest), key=lambda item: int(item[2].sum()))
+    if number > 0:
+        better = fitted_round(KINDS[number - 1], samples[inside], tolerance)
+        if better is not None:
+            again = connected(lying_on(better, samples, tolerance), pairs)
+            surface, inside = (better, again) if again.sum() >= inside.sum() else (surface, inside)
     return surface, inside
 
 
-def _candidates(samples: Samples, tolerance: float) -> list[tuple[int, Surface]]:
-    """Surfaces of the surroundings of seeds, with the number of their kind, 0 for planes."""
+def _candidates(samples: Samples, tolerance: float, seeds: int) -> list[tuple[int, Surface]]:
+    """Surfaces that are tried, with the number of their kind, 0 for planes."""
+    return [*_of_surroundings(samples, seeds), *_of_all(samples, tolerance)]
+
+
+def _of_surroundings(samples: Samples, seeds: int) -> list[tuple[int, Surface]]:
+    """Surfaces of the surroundings of seeds."""
     from scipy.spatial import cKDTree  # slow to import
 
     features = np.column_stack([2.0 * samples.points / max(samples.size, 1e-12), samples.normals])
     tree = cKDTree(samples.points)
     found: list[tuple[int, Surface]] = []
-    for seed in _far_apart(features, SEEDS):
+    for seed in _far_apart(features, seeds):
         for share in SURROUNDINGS:
             count = min(max(15, round(share * len(samples))), len(samples))
             near = np.atleast_1d(tree.query(samples.points[seed], count)[1])
@@ -92,15 +113,17 @@ def _candidates(samples: Samples, tolerance: float) -> list[tuple[int, Surface]]
                 continue
             part = samples[near]
             found.append((0, fitted_flat(part)))
-            for number, kind in enumerate(KINDS[:LOCAL], 1):
-                surface = rough_round(kind, part)
-                if surface is not None:
-                    found.append((number, surface))
-    for number, kind in enumerate(KINDS[LOCAL:], LOCAL + 1):
-        surface = fitted_round(kind, samples, tolerance)
-        if surface is not None:
-            found.append((number, surface))
+            rounds = ((number, rough_round(kind, part)) for number, kind in enumerate(KINDS[:LOCAL], 1))
+            found += [(number, surface) for number, surface in rounds if surface is not None]
     return found
+
+
+def _of_all(samples: Samples, tolerance: float) -> list[tuple[int, Surface]]:
+    """Surfaces of all samples, without those far off a first fit."""
+    rounds = (
+        (number, fitted_round(kind, samples, tolerance)) for number, kind in enumerate(KINDS, 1) if number > LOCAL
+    )
+    return [(number, surface) for number, surface in rounds if surface is not None]
 
 
 def _far_apart(features: Array, count: int) -> list[int]:
@@ -113,25 +136,22 @@ def _far_apart(features: Array, count: int) -> list[int]:
     return chosen
 
 
-def _inside(surface: Surface, samples: Samples, tolerance: float) -> BoolArray:
-    """Which samples lie on a surface, with their normals."""
-    near = np.abs(surface.distances(samples.points)) <= tolerance
-    cosines = np.einsum("nk,nk->n", surface.normals(samples.points), samples.normals)
-    return np.asarray(near & (cosines >= np.cos(SAME_NORMAL)))
-
-
 def _settled(
-    kind: int, surface: Surface, samples: Samples, pairs: IntArray, tolerance: float
+    number: int, surface: Surface, samples: Samples, pairs: IntArray, tolerance: float
 ) -> tuple[Surface, BoolArray] | None:
     """A surface fitted to all that lies on it and hangs together, and its samples; None if it is not genuine."""
-    inside = connected(_inside(surface, samples, tolerance), pairs)
+    inside = connected(lying_on(surface, samples, tolerance), pairs)
     for _ in range(2):
-        if inside.sum() < 20:
+        if inside.sum() < FEWEST:
             return None
         part = samples[inside]
-        again = fitted_flat(part) if kind == 0 else fitted_round(KINDS[kind - 1], part, tolerance)
+        again = fitted_flat(part) if number == 0 else rough_round(KINDS[number - 1], part, surface)
         if again is None:
             return None
-        surface, inside = again, connected(_inside(again, samples, tolerance), pairs)
-    close = np.abs(surface.distances(samples.points[inside])) <= 0.5 * tolerance
-    return (surface, inside) if inside.any() and close.mean() >= GENUINE else None
+        surface, inside = again, connected(lying_on(again, samples, tolerance), pairs)
+    if inside.sum() < FEWEST:
+        return None
+    points = samples.points[inside]
+    if np.mean(np.abs(surface.distances(points)) <= 0.5 * tolerance) < GENUINE:
+        return None
+    return (surface, inside) if number == 0 or filled(surface, points) >= FILLED_PART else None

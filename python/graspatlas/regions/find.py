@@ -9,7 +9,7 @@ import numpy as np
 
 from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.meshes.reading import AnyMesh
-from graspatlas.meshes.repair import repaired_triangles
+from graspatlas.meshes.repair import Repair, Scale, repaired_triangles
 from graspatlas.meshes.triangles import TriangleMesh
 from graspatlas.patches.base import Interval, Patch
 from graspatlas.regions.covering import CELLS, PER_CELL, covering, within
@@ -20,10 +20,16 @@ from graspatlas.regions.surfaces import Surface, vector
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import positive
 
-__all__ = ["find_regions", "region_named"]
+__all__ = ["check_unit", "find_regions", "region_named", "regions_of"]
 
 #: Tolerance by default, as a share of the diagonal of the box around the mesh.
 TOLERANCE = 0.006
+#: Faces at a larger angle are cut apart [rad]: 35 degrees.
+CREASE = float(np.radians(35.0))
+#: Least area of a region, as a share of the mesh's.
+SMALLEST = 0.005
+#: Largest tolerance, as a share of the diagonal.
+COARSEST = 0.2
 #: Areas nearer to one another than this share count as equal when regions are numbered.
 SAME_AREA = 0.01
 
@@ -31,10 +37,10 @@ SAME_AREA = 0.01
 def find_regions(
     mesh: AnyMesh,
     *,
-    scale: float | None = None,
+    scale: Scale | None = None,
     tolerance: float | None = None,
-    crease: float = np.radians(35.0),
-    smallest: float = 0.005,
+    crease: float = CREASE,
+    smallest: float = SMALLEST,
 ) -> tuple[Region, ...]:
     """Cut a mesh into smooth regions, each with the simplest patch that fits it.
 
@@ -46,10 +52,10 @@ def find_regions(
 
     Args:
         mesh: A file that trimesh reads (STL, OBJ, PLY, OFF, ...), or a ``trimesh.Trimesh``.
-        scale: From the mesh's unit to metres; 1 by default, and then a mesh that is too large or too small to be grasped
-            is refused.
-        tolerance: Largest distance of a region from its patch [m]; 0.6 % of the mesh's diagonal by default. Small regions
-            have less: 5 % of the side of a square of their area.
+        scale: From the mesh's unit to metres, one number or three along x, y and z; 1 by default, and then a mesh that
+            is too large or too small to be grasped is refused.
+        tolerance: Largest distance of a region from its patch [m]; 0.6 % of the mesh's diagonal by default. Small
+            regions have less: 5 % of the side of a square of their area.
         crease: Neighbouring faces whose smoothed normals make a larger angle are cut apart [rad].
         smallest: Least area of a region as a share of the mesh's.
 
@@ -57,29 +63,44 @@ def find_regions(
         The regions, the largest first.
 
     Raises:
-        GraspAtlasError: If trimesh is missing, the mesh cannot be read or repaired, seems to be in another unit, or has no
-            region that a patch fits; or an argument is wrong.
+        GraspAtlasError: If trimesh is missing, the mesh cannot be read or repaired, seems to be in another unit, or has
+            no region that a patch fits; or an argument is wrong.
     """
-    if scale is not None:
-        positive(scale, "scale")
+    whole, report = repaired_triangles(mesh, 1.0 if scale is None else scale)
+    if scale is None:
+        check_unit(report)
+    return regions_of(whole, tolerance=tolerance, crease=crease, smallest=smallest)
+
+
+def check_unit(report: Repair) -> None:
+    """Refuse a mesh that seems to be in another unit than metres.
+
+    Raises:
+        GraspAtlasError: If it does, with the scale to state.
+    """
+    if report.unit_doubt():
+        raise GraspAtlasError(report.unit_doubt())
+
+
+def regions_of(
+    mesh: TriangleMesh, *, tolerance: float | None = None, crease: float = CREASE, smallest: float = SMALLEST
+) -> tuple[Region, ...]:
+    """:func:`find_regions` of a mesh that is repaired already."""
     positive(crease, "crease", np.pi)
     positive(smallest, "smallest", 1.0)
-    whole, report = repaired_triangles(mesh, 1.0 if scale is None else scale)
-    if scale is None and report.unit_doubt():
-        raise GraspAtlasError(report.unit_doubt())
-    limit = TOLERANCE * whole.diagonal if tolerance is None else positive(tolerance, "tolerance")
-    if limit > 0.2 * whole.diagonal:
+    limit = TOLERANCE * mesh.diagonal if tolerance is None else positive(tolerance, "tolerance")
+    if limit > COARSEST * mesh.diagonal:
         raise GraspAtlasError(
-            f"tolerance {limit:g} m is more than a fifth of the mesh's diagonal, {whole.diagonal:.3g} m: choose less"
+            f"tolerance {limit:g} m is more than a fifth of the mesh's diagonal, {mesh.diagonal:.3g} m: choose less"
         )
-    cutting = Cutting(whole, limit, crease, smallest * float(whole.areas.sum()))
-    found = [region for part in cutting.parts() if (region := _region(whole, part)) is not None]
+    cutting = Cutting(mesh, limit, crease, smallest * float(mesh.areas.sum()))
+    found = [region for part in cutting.parts() if (region := _region(mesh, part)) is not None]
     if not found:
         raise GraspAtlasError(
             "no part of the mesh is smooth enough for a patch within the tolerance of "
             f"{1e3 * limit:.3g} mm: choose a larger tolerance, or a mesh with less noise"
         )
-    return _named(found, whole.diagonal)
+    return _named(found, mesh.diagonal)
 
 
 def region_named(regions: tuple[Region, ...], name: str) -> Region:

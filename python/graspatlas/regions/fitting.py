@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from graspatlas.patches.spline import clamped_knots
-from graspatlas.regions.surfaces import Ball, Flat, Graph, Outline, Surface, Turned, frame_about
-from graspatlas.support.arrays import Array, BoolArray
+from graspatlas.regions.surfaces import Ball, Flat, Graph, Outline, Surface, Turned, frame_about, natural_splines
+from graspatlas.support.arrays import Array, BoolArray, IndexArray, IntArray
 
 __all__ = ["Samples", "fits", "fitted_ball", "fitted_flat", "fitted_round", "rough_round", "simplest_surface"]
 
@@ -45,9 +45,9 @@ class Samples:
 
     points: Array
     normals: Array
-    faces: Array
+    faces: IntArray
 
-    def __getitem__(self, which: Array | BoolArray | slice) -> Samples:
+    def __getitem__(self, which: IntArray | BoolArray | IndexArray) -> Samples:
         return Samples(self.points[which], self.normals[which], self.faces[which])
 
     def __len__(self) -> int:
@@ -66,6 +66,13 @@ def fits(surface: Surface, samples: Samples, tolerance: float) -> bool:
         return False
     cosines = np.einsum("nk,nk->n", surface.normals(samples.points), samples.normals)
     return bool(np.mean(cosines >= np.cos(SAME_NORMAL)) >= AGREEING)
+
+
+def lying_on(surface: Surface, samples: Samples, tolerance: float) -> BoolArray:
+    """Which samples lie on a surface, and their normals with its (n,)."""
+    near = np.abs(surface.distances(samples.points)) <= tolerance
+    cosines = np.einsum("nk,nk->n", surface.normals(samples.points), samples.normals)
+    return np.asarray(near & (cosines >= np.cos(SAME_NORMAL)))
 
 
 def simplest_surface(samples: Samples, tolerance: float, *, freeform: bool = True) -> Surface | None:
@@ -165,8 +172,10 @@ def fitted_round(kind: str, samples: Samples, tolerance: float) -> Surface | Non
     return best
 
 
-def rough_round(kind: str, samples: Samples) -> Surface | None:
-    """A turned surface, or sphere, by linear least squares alone."""
+def rough_round(kind: str, samples: Samples, first: Surface | None = None) -> Surface | None:
+    """A turned surface, or sphere, by linear least squares; about the axis of another fit of outlines by height."""
+    if kind in ("torus", "revolution") and isinstance(first, Turned):
+        return _turned(kind, samples, first.origin, first.axes[:, 1])
     return next(iter(_round_candidates(kind, samples)), None)
 
 
@@ -288,7 +297,7 @@ def _curve(h: Array, r: Array, half: float) -> Outline | None:
     last = np.inf
     for count in OUTLINES:
         knots = np.linspace(-half, half, count)
-        A = _hats(h, knots)
+        A = natural_splines((h + half) / (2.0 * half), count)
         D = np.diff(np.eye(count), 2, axis=0)
         radii = np.linalg.solve(A.T @ A + 1e-3 * len(h) / count * (D.T @ D) + 1e-9 * np.eye(count), A.T @ r)
         if not (radii > 0.0).all():
@@ -300,13 +309,6 @@ def _curve(h: Array, r: Array, half: float) -> Outline | None:
         else:
             break
     return best
-
-
-def _hats(x: Array, knots: Array) -> Array:
-    """Values at x of the natural cubic splines that are one at one knot each (n, knots)."""
-    from scipy.interpolate import CubicSpline  # slow to import
-
-    return np.asarray(CubicSpline(knots, np.eye(len(knots)), bc_type="natural")(x))
 
 
 def _refined(kind: str, samples: Samples, surface: Turned) -> Turned | None:

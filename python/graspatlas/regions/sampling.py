@@ -30,7 +30,9 @@ def spread(corners: Array, areas: Array, normals: Array, faces: IntArray, count:
     """Samples of some faces of a mesh, always the same.
 
     Args:
-        corners, areas, normals: Of all faces of the mesh.
+        corners: Corners of all faces of the mesh (m, 3, 3) [m].
+        areas: Their areas (m,) [m2].
+        normals: Their normals (m, 3).
         faces: The faces to sample.
         count: How many samples.
     """

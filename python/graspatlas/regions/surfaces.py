@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -15,7 +16,7 @@ from graspatlas.patches.spline import BSpline
 from graspatlas.patches.turned import Cone, Cylinder, Revolution
 from graspatlas.support.arrays import Array, BoolArray
 
-__all__ = ["Ball", "Flat", "Graph", "Outline", "Surface", "Turned", "vector"]
+__all__ = ["Ball", "Flat", "Graph", "Outline", "Surface", "Turned", "natural_splines", "vector"]
 
 #: The outermost latitudes of a sphere that a patch has [rad]: 86 degrees.
 LATITUDE = 1.5
@@ -128,7 +129,7 @@ class Ball(Surface):
         """Directions from the centre, or to it."""
         out = points - self.center
         out = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300)
-        return -out if self.flipped else out
+        return np.asarray(-out if self.flipped else out)
 
     def parameters(self, points: Array) -> Array:
         """Longitudes and latitudes."""
@@ -183,7 +184,7 @@ class Outline:
         """Parameter v of the nearest points: a height, or an angle about the tube."""
         if self.kind == "torus":
             return np.asarray(np.arctan2(h - self.heights[0], r - self.radii[0]))
-        along, across = self.normals(h, r)
+        along, _ = self.normals(h, r)
         return np.asarray(h - along * self.distances(h, r)) if self.kind == "cone" else h
 
     def radius(self, h: Array) -> tuple[Array, Array]:
@@ -192,12 +193,15 @@ class Outline:
             (h0, h1), (r0, r1) = self.heights, self.radii
             slope = (r1 - r0) / (h1 - h0)
             return r0 + slope * (h - h0), np.full_like(h, slope)
-        from scipy.interpolate import CubicSpline  # slow to import
-
-        spline = CubicSpline(self.heights, self.radii, bc_type="natural")
-        inside = np.clip(h, self.heights[0], self.heights[-1])
-        slope = spline(inside, 1)
-        return np.asarray(spline(inside) + slope * (h - inside)), np.asarray(slope)
+        low, high = self.heights[[0, -1]]
+        inside = np.clip(h, low, high)
+        pieces = len(self.heights) - 1
+        t = (inside - low) * (pieces / (high - low))
+        piece = np.clip(t.astype(int), 0, pieces - 1)
+        s = t - piece
+        c3, c2, c1, c0 = (natural_coefficients(pieces + 1) @ self.radii)[:, piece]
+        slope = (c1 + s * (2.0 * c2 + 3.0 * s * c3)) * (pieces / (high - low))
+        return np.asarray(c0 + s * (c1 + s * (c2 + s * c3)) + slope * (h - inside)), np.asarray(slope)
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +240,7 @@ class Turned(Surface):
         along, across = self.outline.normals(h, r)
         share = across / np.maximum(r, 1e-300)
         out = np.column_stack([share * x, along, share * z]) @ self.axes.T
-        return -out if self.flipped else out
+        return np.asarray(-out if self.flipped else out)
 
     def regular(self, points: Array) -> BoolArray:
         """Where the radius is neither small nor steep by height."""
@@ -365,6 +369,27 @@ class Graph(Surface):
             v_interval=kept[1],
             unit="m",
         )
+
+
+def natural_splines(x: Array, count: int) -> Array:
+    """Values (n, count) at x, between 0 and 1 (n,), of the splines of :func:`natural_coefficients`."""
+    t = x * (count - 1)
+    piece = np.clip(t.astype(int), 0, count - 2)
+    s = (t - piece)[:, None]
+    c3, c2, c1, c0 = natural_coefficients(count)[:, piece]
+    return np.asarray(c0 + s * (c1 + s * (c2 + s * c3)))
+
+
+@lru_cache(maxsize=64)
+def natural_coefficients(count: int) -> Array:
+    """Natural cubic splines over knots one apart, each one at its knot and zero at the others.
+
+    Returns:
+        Their coefficients in each piece, highest power first (4, count - 1, count).
+    """
+    from scipy.interpolate import CubicSpline  # slow to import
+
+    return np.asarray(CubicSpline(np.arange(count), np.eye(count), bc_type="natural").c)
 
 
 def frame_about(axis: Array, hint: Array) -> Array:
