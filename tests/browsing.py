@@ -7,6 +7,7 @@ import json
 import os
 import select
 import subprocess
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -27,8 +28,14 @@ FLAGS = (
     "--hide-scrollbars",
     "--remote-debugging-pipe",
 )
+#: Starts a program that reads from 3 and writes to 4.
+ON_PIPES = """import fcntl, os, sys
+read, write = (fcntl.fcntl(int(end), fcntl.F_DUPFD, 10) for end in sys.argv[1:3])
+os.dup2(read, 3)
+os.dup2(write, 4)
+os.execv(sys.argv[3], sys.argv[3:])"""
 #: Time in which the browser must answer [s].
-PATIENCE = 60.0
+PATIENCE = 30.0
 KEYS = {"Enter": ("Enter", 13, "\r"), "Escape": ("Escape", 27, ""), " ": ("Space", 32, " ")} | {
     f"Arrow{side}": (f"Arrow{side}", code, "") for side, code in (("Left", 37), ("Up", 38), ("Right", 39), ("Down", 40))
 }
@@ -88,7 +95,9 @@ class Tab:
         assert "exceptionDetails" not in got, got["exceptionDetails"]
         return got["result"].get("value")
 
-    def open(self, address: str, width: int = 1400, height: int = 900, *, dark: bool = False, touch: bool = False) -> None:
+    def open(
+        self, address: str, width: int = 1000, height: int = 640, *, dark: bool = False, touch: bool = False
+    ) -> None:
         """Open an explorer page, and wait until it is ready."""
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": touch}
         self.ask("Emulation.setDeviceMetricsOverride", **size)
@@ -109,7 +118,8 @@ class Tab:
 
     def frames(self, count: int = 2) -> None:
         """Wait for so many frames."""
-        self.run(f"new Promise((done) => {{ let n = {count}; const f = () => (n-- ? requestAnimationFrame(f) : done()); f(); }})")
+        for _ in range(count):
+            self.run("new Promise(requestAnimationFrame)")
 
     def mouse(self, kind: str, x: float, y: float, button: str = "none", **also: Any) -> None:
         """A real pointer event: ``mouseMoved``, ``mousePressed``, ``mouseReleased`` or ``mouseWheel``."""
@@ -144,9 +154,24 @@ class Tab:
             self.ask("Input.dispatchKeyEvent", type=kind, key=key, code=code, windowsVirtualKeyCode=number, **also)
 
     def middle(self, css: str) -> tuple[float, float]:
-        """Middle of an element in the window."""
-        box = self.run(f"(() => {{ const b = document.querySelector({css!r}).getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; }})()")
-        return float(box[0]), float(box[1])
+        """Middle of an element in the window, into which it is scrolled."""
+        self.run(f"document.querySelector({css!r}).scrollIntoView({{ block: 'nearest' }})")
+        box = self.box(css)
+        return float(box["x"] + box["width"] / 2.0), float(box["y"] + box["height"] / 2.0)
+
+    def box(self, css: str) -> dict[str, float]:
+        """Where an element is: ``x``, ``y``, ``width``, ``height``."""
+        return dict(self.run(f"document.querySelector({css!r}).getBoundingClientRect().toJSON()"))
+
+    def choose(self, css: str, option: str) -> None:
+        """Choose an option of a list by its text, as a user who has opened it."""
+        self.run(
+            f"""(() => {{
+            const list = document.querySelector({css!r});
+            list.selectedIndex = [...list.options].findIndex((option) => option.text === {option!r});
+            list.dispatchEvent(new Event("change"));
+        }})()"""
+        )
 
     def picture(self, path: Path, *, whole: bool = False) -> None:
         """Save what is seen, or the whole page, as a PNG file."""
@@ -159,7 +184,7 @@ def browser(folder: Path) -> Iterator[Tab]:
     """A browser with one page, closed at the end."""
     (read, to), (back, write) = os.pipe(), os.pipe()
     words = [find_browser(), *FLAGS, f"--user-data-dir={folder / 'profile'}"]
-    command = ["sh", "-c", f'exec "$0" "$@" 3<&{read} 4>&{write}', *words]
+    command = [sys.executable, "-c", ON_PIPES, str(read), str(write), *words]
     process = subprocess.Popen(command, pass_fds=(read, write), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     os.close(read)
     os.close(write)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -69,7 +69,7 @@ class Charts:
         for name in QUICK:
             if name not in columns:
                 try:
-                    columns[name] = self._of_all(lambda grasps, name=name: evaluate(name, grasps))
+                    columns[name] = self._of_all(partial(evaluate, name))
                 except GraspAtlasError:  # it does not apply to this problem
                     continue
         main = quality_name(result.quality)
@@ -98,7 +98,7 @@ class Charts:
         names = [requirement_name(r) for r in named]
         bits = np.zeros(len(self._of_all(lambda grasps: grasps.charts)), np.uint32)
         for bit, requirement in enumerate(named):
-            bits |= (self._of_all(lambda grasps, r=requirement: asked(r, grasps)) == 0.0).astype(np.uint32) << bit
+            bits |= (self._of_all(partial(asked, requirement)) == 0.0).astype(np.uint32) << bit
         by_functions = np.flatnonzero((bits[: len(self.result.accepted)] == 0) & ~self.result.accepted)
         if len(by_functions):
             functions = [requirement_name(r) for r in self.result.requirements if r not in named]
@@ -118,7 +118,9 @@ class Charts:
         numbers.add_rounded("object_quat", self._of_all(lambda grasps: grasps.object_quat_xyzw))
         for name, column in zip(("contact_points", "contact_normals"), self._contacts(), strict=True):
             numbers.add_rounded(name, column)
-        axes, semi_axes = (np.concatenate(parts) for parts in zip(*map(velocity_ellipsoids, self._batches), strict=True))
+        axes, semi_axes = (
+            np.concatenate(parts) for parts in zip(*map(velocity_ellipsoids, self._batches), strict=True)
+        )
         numbers.add_rounded("ellipsoid_axes", axes[:, :, :2].swapaxes(1, 2).reshape(len(axes), 6))
         numbers.add_rounded("ellipsoid_lengths", semi_axes, log=True)
         numbers.add_rounded("semi_axes", self._of_all(lambda grasps: grasps.semi_axes), log=True)

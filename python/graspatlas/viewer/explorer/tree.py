@@ -48,7 +48,9 @@ def joint_tree(hand: Hand) -> list[Joint]:
         parent = hand.frame(str(link.get("link")))[0]
         moved = _placements(hand, {name: float(name == info.name) for name in names})
         step = inverse(zero[i]) @ moved[i]
-        joints.append(Joint(info.name, parent, inverse(zero[parent]) @ zero[i], _axis(step, info.prismatic), info.prismatic))
+        joints.append(
+            Joint(info.name, parent, inverse(zero[parent]) @ zero[i], _axis(step, info.prismatic), info.prismatic)
+        )
     return joints
 
 

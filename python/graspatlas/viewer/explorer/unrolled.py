@@ -56,7 +56,7 @@ def _steps(atlas: Atlas, pairs: IntArray) -> Array:
     """a_ij: centre of the second chart of each pair (p, 2) in the tangent space of the first (p, 2)."""
     difference, centers = atlas.system.difference, atlas.centers
     moves = np.array([difference(centers[i], centers[j]) for i, j in pairs])
-    return np.einsum("pkt,pt->pk", atlas.bases[pairs[:, 0]], moves.reshape(len(pairs), -1))
+    return np.asarray(np.einsum("pkt,pt->pk", atlas.bases[pairs[:, 0]], moves.reshape(len(pairs), -1)))
 
 
 def _laid_down(atlas: Atlas, pairs: IntArray, steps: Array) -> tuple[Array, Array]:

@@ -19,8 +19,8 @@ from graspatlas.quality.batched import quality_name
 from graspatlas.result.result import Result
 from graspatlas.support.arrays import Array
 from graspatlas.viewer.figures.drawing.surface import Place, View, add_axes, add_polygons, quality_colours, scale_of
-from graspatlas.viewer.scene.polygons import Coordinates, chart_polygons, default_coordinates, open_charts
 from graspatlas.viewer.figures.style import BLUE, INK, PAGE, RED, REJECTED, SINGULAR, Picture, styled
+from graspatlas.viewer.scene.polygons import Coordinates, chart_polygons, default_coordinates, open_charts
 
 __all__ = ["VIEWS", "AtlasDrawing", "plot_atlas", "plot_growth"]
 

@@ -25,7 +25,7 @@ class AtlasView {
     this.trail = null;
     this.build(numbers.has("corners") ? "surface" : "points");
     selection.on("view", () => this.paint());
-    selection.on("grasps", () => this.stage.request());
+    selection.on("grasps", () => this.mark());
   }
 
   get modes() {
@@ -275,18 +275,22 @@ class AtlasView {
     this.lamp.target.position.copy(orbit.target).add(orbit.pan);
     this.lamp.target.updateMatrixWorld();
     stage.renderer.render(this.scene, orbit.camera);
-    this.mark(width, height);
+    this.name(width, height);
+    this.mark();
   }
 
-  // Put names of axes and of the grasps that are shown where they belong.
-  mark(width, height) {
-    const { selection } = this;
+  // Put the names of the axes at their ends.
+  name(width, height) {
     this.labels.forEach((label, c) => {
-      const { x, y } = this.project(this.ends[c], width, height);
-      const wide = label.offsetWidth || 60;
+      const { x, y } = this.project(this.ends[c], width, height), wide = label.offsetWidth || 60;
       const left = Math.min(Math.max(x - wide / 2, 2), width - wide - 2), top = Math.min(Math.max(y - 9, 2), height - 20);
       label.style.transform = `translate(${left}px, ${top}px)`;
     });
+  }
+
+  // Mark the grasps that are shown.
+  mark() {
+    const { selection } = this, { clientWidth: width, clientHeight: height } = this.canvas;
     const wanted = selection.shown.map((grasp, i) => [grasp, selection.pins.includes(grasp) ? "AB"[i] : ""]);
     while (this.marks.length > wanted.length) this.marks.pop().remove();
     while (this.marks.length < wanted.length) {

@@ -241,12 +241,12 @@ async function start() {
   const table = new NumbersTable(selection, hand);
   new Controls(selection, atlas, hand);
   new Histogram(selection);
-  new Scatter(selection);
+  const scatter = new Scatter(selection);
   const path = new PathPlayer(selection, grasps, atlas);
   new Keys(selection, atlas);
   new Address(selection);
   startTheme(() => selection.tell("view"));
-  window.graspatlas = { facts, selection, grasps, atlas, hand, table, path }; // for whoever looks from the console
+  window.graspatlas = { facts, selection, grasps, atlas, hand, table, path, scatter }; // for whoever looks from the console
   document.documentElement.dataset.ready = "yes";
 }
 
