@@ -89,6 +89,7 @@ class Controls {
   // The colour bar with its ends and the unit.
   scale() {
     const { selection } = this, index = facts.indices[selection.index], [low, high] = selection.extent();
+    byId("log").checked = selection.log;
     byId("scale-low").textContent = short(low);
     byId("scale-high").textContent = short(high);
     byId("scale-unit").textContent = [index.label, index.unit, selection.log ? "logarithmic" : ""].filter(Boolean).join(", ");

@@ -165,8 +165,9 @@ class Scatter extends Plot {
   }
 
   scale(index, length, margin) {
-    const [low, high] = this.selection.extent(index), span = high - low || 1;
-    return (value) => margin + ((Math.min(Math.max(value, low), high) - low) / span) * (length - 2 * margin);
+    const { selection } = this, extent = selection.extent(index);
+    const log = index === selection.index ? selection.log : selection.skewed(index), share = selection.scaled(extent, log);
+    return (value) => margin + Math.min(Math.max(share(value), 0), 1) * (length - 2 * margin);
   }
 
   // Charts that no other beats by both indices, by falling first one.

@@ -9,15 +9,18 @@ class Selection {
     this.columns = facts.indices.map((_, i) => numbers.get(`index_${i}`));
     this.rejections = numbers.get("rejections");
     this.enabled = facts.requirements.map(() => true);
-    [this.index, this.other] = [0, facts.indices.length > 1 ? 1 : 0];
+    this.index = 0;
     this.range = null; // from the histogram
-    this.log = false;
+    this.log = this.chosenLog = false;
     this.pins = [];
     this.current = -1; // what is pointed at or walked to
     this.listeners = { view: [], grasps: [] };
     this.counts = new Uint8Array(facts.n_charts); // 1 where the requirements that are switched on are met
     this.inside = new Uint8Array(facts.n_charts); // and the value is in the range
     this.screen();
+    this.log = this.skewed(this.index);
+    const varies = (i) => { const [low, high] = this.extent(i); return i > 0 && high > low; };
+    this.other = Math.max(facts.indices.findIndex((_, i) => varies(i)), 0);
   }
 
   on(what, listener) {
@@ -39,6 +42,8 @@ class Selection {
     if ("index" in changes && changes.index !== this.index) this.range = null;
     Object.assign(this, changes);
     this.screen();
+    if ("log" in changes) this.chosenLog = true;
+    else if (!this.chosenLog && !this.range) this.log = this.skewed(this.index);
     this.tell("view");
   }
 
@@ -76,9 +81,17 @@ class Selection {
     return low <= high ? [low, high] : [0, 1];
   }
 
-  // From 0 to 1 along the colours and the histogram.
-  scaled([low, high] = this.extent()) {
-    if (!this.log) return (value) => (high > low ? (value - low) / (high - low) : 0.5);
+  // Whether few charts have so large a value that all others would look alike.
+  skewed(index) {
+    const values = [...this.columns[index].subarray(0, facts.n_charts)].filter((value, i) => this.counts[i] && Number.isFinite(value));
+    values.sort((a, b) => a - b);
+    const [low, high, most] = [0, 1, 0.95].map((share) => values[Math.floor(share * (values.length - 1))]);
+    return values.length > 1 && low >= 0 && high - low > 20 * (most - low) && most > low;
+  }
+
+  // From 0 to 1 along the colours and the histogram, and along an axis.
+  scaled([low, high] = this.extent(), log = this.log) {
+    if (!log) return (value) => (high > low ? (value - low) / (high - low) : 0.5);
     const least = Math.max(low, high * 1e-12), span = Math.log(high / least);
     return (value) => (span > 0 ? Math.log(Math.max(value, least) / least) / span : 0.5);
   }
