@@ -217,17 +217,22 @@ class HandView {
       figure.object.visible = this.visible.object;
       this.orbit.update(w / h);
       this.light(figure);
-      const room = Math.min(74, h / 4); // for the caption, below the hand
       renderer.setViewport(x, y, w, h);
       renderer.setScissor(x, y, w, h);
-      this.orbit.camera.setViewOffset(w, h, 0, room / 2, w, h);
+      this.orbit.camera.setViewOffset(w, h, 0, this.room / 2, w, h);
       renderer.render(figure.scene, this.orbit.camera);
       this.orbit.camera.clearViewOffset();
     });
   }
 
+  // Stand where hand and object are above the captions, whose height counts when the panes change their shape.
   fit([, , width, height]) {
-    const room = Math.min(74, height / 4);
+    const shape = `${width} ${height}`;
+    if (shape !== this.shape) {
+      const tallest = Math.max(...[...this.captions.children].map((caption) => caption.offsetHeight));
+      Object.assign(this, { shape, room: Math.min(tallest, height / 3) });
+    }
+    const { room } = this;
     this.orbit.fit(facts.view.points, width / (height - room), (1.04 * height) / (height - room));
   }
 
