@@ -168,6 +168,16 @@ def test_a_page_opens_at_a_chart_that_exists(planar_result: ga.Result, tmp_path:
         export_html(ga.shortest_path(planar_result, 0, 5), tmp_path / "page.html", chart=0)
 
 
+def test_view_opens_the_page_at_a_chart(planar_result: ga.Result, tmp_path: Path, cli: Callable[..., Any]) -> None:
+    planar_result.save(tmp_path / "result.npz")
+    place = tmp_path / "page.html"
+    assert cli("view", tmp_path, "--html", place, "--chart", "worst")[0] == 0
+    assert f'"opens_at": {planar_result.worst.chart},' in place.read_text(encoding="utf-8")
+    status, _, err = cli("view", tmp_path, "--chart", "worst")
+    assert status != 0
+    assert "give --html FILE too" in err
+
+
 def test_the_page_is_written_where_no_grasp_meets_the_requirements(small_result: ga.Result, tmp_path: Path) -> None:
     nothing = replace(small_result, accepted=np.zeros(small_result.atlas.n_charts, bool))
     export_html(nothing, tmp_path / "page.html")

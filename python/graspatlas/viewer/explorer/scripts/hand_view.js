@@ -116,7 +116,7 @@ class Figure {
       const strength = Math.hypot(...force);
       this.forces[i].visible = strength > 0;
       if (!(strength > 0)) return;
-      const size = (1.3 * length * strength) / largest, direction = force.map((c) => c / strength);
+      const size = (1.1 * length * strength) / largest, direction = force.map((c) => c / strength);
       along(this.forces[i].matrix, point.map((c, k) => c - size * direction[k]), direction, size);
     });
     this.placeEllipsoid(read);
