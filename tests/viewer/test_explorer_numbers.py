@@ -123,3 +123,10 @@ def test_functions_are_not_asked_again(small_result: ga.Result) -> None:
     assert ((bits == 0) == result.accepted).all()
     assert names[0].startswith("collision_free")
     assert before > 0
+
+
+def test_a_single_chart_is_laid_out(can: ga.Problem) -> None:
+    alone = ga.optimize(can, dimension=2, require=[], max_charts=1).atlas
+    centers, R = unrolled(alone)
+    np.testing.assert_allclose(centers, np.zeros((1, 2)))
+    np.testing.assert_allclose(R[0] @ R[0].T, np.eye(2), atol=1e-12)

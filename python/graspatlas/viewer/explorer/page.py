@@ -103,7 +103,8 @@ def _extremes(result: GraspAtlas) -> str:
         grasps.append(("worst", result.worst))
     if not grasps:
         return "no grasp meets the requirements"
-    values = ", ".join(f"{name} {grasp.quality:.3g} (chart {grasp.chart})" for name, grasp in grasps)
+    places = [f" (chart {grasp.chart})" if grasp.chart >= 0 else "" for _, grasp in grasps]
+    values = ", ".join(f"{name} {g.quality:.3g}{place}" for (name, g), place in zip(grasps, places, strict=True))
     return f"{index_name(result)}: {values}"
 
 

@@ -48,15 +48,18 @@ def unrolled(atlas: Atlas) -> tuple[Array, Array]:
     back = np.roll(np.arange(len(pairs)), len(pairs) // 2)  # the same two charts the other way round
     whole &= whole[back]
     y, R = _given_way(y, R, pairs[whole], steps[whole], steps[back[whole]])
-    upright = np.linalg.svd(y - y.mean(axis=0), full_matrices=False)[2]  # the longest way across lies level
-    return (y - y.mean(axis=0)) @ upright.T, upright @ R
+    y = y - y.mean(axis=0)
+    upright = np.linalg.eigh(y.T @ y)[1].T[::-1]  # the longest way across lies level
+    return y @ upright.T, upright @ R
 
 
 def _steps(atlas: Atlas, pairs: IntArray) -> Array:
     """a_ij: centre of the second chart of each pair (p, 2) in the tangent space of the first (p, 2)."""
     difference, centers = atlas.system.difference, atlas.centers
     moves = np.array([difference(centers[i], centers[j]) for i, j in pairs])
-    return np.asarray(np.einsum("pkt,pt->pk", atlas.bases[pairs[:, 0]], moves.reshape(len(pairs), -1)))
+    return np.asarray(
+        np.einsum("pkt,pt->pk", atlas.bases[pairs[:, 0]], moves.reshape(len(pairs), atlas.bases.shape[2]))
+    )
 
 
 def _laid_down(atlas: Atlas, pairs: IntArray, steps: Array) -> tuple[Array, Array]:

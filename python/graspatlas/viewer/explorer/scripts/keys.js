@@ -42,7 +42,8 @@ class Keys {
   }
 
   walk(dx, dy) {
-    const next = this.atlas.neighbourTowards(this.selection.chartOf(this.selection.focus), dx, dy);
+    const chart = this.selection.chartOf(this.selection.focus);
+    const next = chart < 0 ? -1 : this.atlas.neighbourTowards(chart, dx, dy);
     if (next >= 0) this.selection.point(next);
   }
 }

@@ -139,7 +139,9 @@ class PathPlayer {
   // Forget the path when other grasps are pinned.
   check() {
     const { pins } = this.selection, ends = pins.join();
-    this.button.disabled = pins.length < 2 || this.selection.chartOf(pins[0]) === this.selection.chartOf(pins[1]);
+    const [from, to] = pins.map((pin) => this.selection.chartOf(pin)); // -1 of a maximum that no chart leads to
+    this.button.disabled = pins.length < 2 || from === to || Math.min(from, to) < 0;
+    if (this.playing && this.selection.current !== this.expected) this.stop(); // somebody has chosen another grasp
     if (ends === this.ends) return;
     this.ends = ends;
     this.chain = null;
@@ -176,7 +178,7 @@ class PathPlayer {
     const first = Number(this.slider.value) >= this.chain.length - 1 ? 0 : Number(this.slider.value);
     const started = performance.now() - (1000 * first) / CHARTS_A_SECOND;
     this.playing = true;
-    this.button.textContent = "\u23f8 path";
+    this.button.textContent = "\u25a0 path";
     const advance = (now) => {
       if (!this.playing) return;
       const at = Math.min(Math.floor(((now - started) / 1000) * CHARTS_A_SECOND), this.chain.length - 1);
@@ -194,6 +196,7 @@ class PathPlayer {
 
   show(at) {
     this.slider.value = at;
+    this.expected = this.chain[at];
     this.selection.point(this.chain[at]);
   }
 }
