@@ -169,7 +169,7 @@ class PathPlayer {
     const met = this.selection.enabled.some(Boolean)
       ? accepted ? " and meets the requirements" : "; not all of them meet the requirements, no such chain does" : "";
     return `The shortest chain of neighbouring charts: ${this.chain.length} grasps, length ${short(total, 3)}. Each is a grasp of the atlas`
-      + ` that keeps all contacts${met}. For the smooth shortest path between them: graspatlas path --from ${this.chain[0]} --to ${this.chain[this.chain.length - 1]}.`;
+      + ` that keeps all contacts${met}. For the smooth shortest path between them: graspatlas path OUT --from ${this.chain[0]} --to ${this.chain[this.chain.length - 1]}.`;
   }
 
   play() {
@@ -231,7 +231,10 @@ class Address {
     clearTimeout(this.timer);
     this.timer = setTimeout(() => {
       const hash = `#chart=${this.selection.shown.join()}`;
-      if (hash !== location.hash) history.replaceState(null, "", hash);
+      if (hash === location.hash) return;
+      try {
+        history.replaceState(null, "", hash);
+      } catch {} // a page within another one has no address of its own
     }, 150);
   }
 }
