@@ -45,7 +45,7 @@ FLOORS = (
         "simulation",
         "formats",
     ),
-    *("viewer.scene", "viewer.render", "viewer.web", "viewer.figures", "viewer"),
+    *("viewer.scene", "viewer.render", "viewer.web", "viewer.explorer", "viewer.figures", "viewer"),
     *("reproduce", "sweep", "commands", "cli", "__main__"),
 )
 #: Packages whose ``__init__`` is no face but defines what it offers.

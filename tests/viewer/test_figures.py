@@ -18,9 +18,9 @@ from graspatlas.analysis.climb import climb
 from graspatlas.viewer import figures
 from graspatlas.viewer.figures.ellipse import extreme_semi_axes
 from graspatlas.viewer.figures.indices import SINGULAR_BELOW, with_index
-from graspatlas.viewer.figures.polygons import chart_polygons, default_coordinates, object_pose, open_charts, principal
 from graspatlas.viewer.figures.portrait import portrait
 from graspatlas.viewer.figures.style import QUALITY, readable
+from graspatlas.viewer.scene.polygons import chart_polygons, default_coordinates, object_pose, open_charts, principal
 
 Array = NDArray[np.float64]
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.paths.path import Path
+from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.result.result import Result
 from graspatlas.simulation.recording import Recording
 
@@ -55,29 +56,33 @@ def view(shown: Shown, *, open_browser: bool = True, wait: bool = True, host: st
     return show(told, open_browser=open_browser, wait=wait, host=host)
 
 
-def export_html(shown: Shown | Scene, path: str | os.PathLike[str]) -> None:
-    """Write the best and the worst grasp of a result as one page to rotate; or a path or trials, with a slider.
+def export_html(shown: Shown | Scene, path: str | os.PathLike[str], *, chart: int | None = None) -> None:
+    """Write a page: a result's whole atlas with the hand beside it, to look through; or a path or trials, as a film.
 
-    The page opens from the disk; it needs neither a server nor the network. That of a film opens at the frame that its
-    address names, such as ``path.html#frame=30``.
+    The page opens from the disk; it needs neither a server nor the network. That of a result shows the grasp of any
+    chart that is pointed at, coloured by any index that the result has, and opens at the grasps that its address names,
+    such as ``can.html#chart=12,40``; by default at the best, the worst beside it. That of a film opens at the frame
+    that its address names, such as ``path.html#frame=30``.
 
     Args:
         shown: The result, a path of grasps, or what :func:`graspatlas.record` recorded: one trial, or a list of them.
-            The scene of a result, which takes a moment to set up, can be shown more than once.
+            The scene of a result is shown as the result.
         path: Such as ``"can.html"``; an existing file is replaced.
+        chart: The chart at which the page of a result opens.
 
     Raises:
-        GraspAtlasError: If a mesh cannot be read or the file cannot be written.
+        GraspAtlasError: If a mesh cannot be read, there is no such chart, or the file cannot be written.
     """
     from graspatlas.storage.files import replaced
+    from graspatlas.viewer.explorer.page import explorer_page
     from graspatlas.viewer.scene.scene import Scene
     from graspatlas.viewer.web.animation_page import film_page
-    from graspatlas.viewer.web.page import page
 
-    shown = shown if isinstance(shown, Scene) else _checked(shown)
+    told = shown.result if isinstance(shown, Scene) else _checked(shown)
+    if chart is not None and not isinstance(told, GraspAtlas):
+        raise GraspAtlasError("a chart is opened in the page of a result; a film opens at a frame: path.html#frame=30")
     with replaced(path) as stream:
-        shown = Scene(shown) if isinstance(shown, Result) else shown
-        text = page(shown) if isinstance(shown, Scene) else film_page(_film(shown))
+        text = explorer_page(told, chart) if isinstance(told, GraspAtlas) else film_page(_film(told))
         stream.write(text.encode("utf-8"))
 
 

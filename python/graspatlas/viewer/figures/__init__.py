@@ -12,7 +12,7 @@ from graspatlas.viewer.figures.ladder import plot_ladder
 from graspatlas.viewer.figures.maxima import plot_climbs, plot_local_maxima
 from graspatlas.viewer.figures.pareto import plot_pareto
 from graspatlas.viewer.figures.planar import plot_planar_grasp
-from graspatlas.viewer.figures.polygons import Coordinates, object_pose, principal
+from graspatlas.viewer.scene.polygons import Coordinates, object_pose, principal
 
 __all__ = [
     "Coordinates",

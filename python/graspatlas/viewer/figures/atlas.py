@@ -19,8 +19,8 @@ from graspatlas.quality.batched import quality_name
 from graspatlas.result.result import Result
 from graspatlas.support.arrays import Array
 from graspatlas.viewer.figures.drawing.surface import Place, View, add_axes, add_polygons, quality_colours, scale_of
-from graspatlas.viewer.figures.polygons import Coordinates, chart_polygons, default_coordinates, open_charts
 from graspatlas.viewer.figures.style import BLUE, INK, PAGE, RED, REJECTED, SINGULAR, Picture, styled
+from graspatlas.viewer.scene.polygons import Coordinates, chart_polygons, default_coordinates, open_charts
 
 __all__ = ["VIEWS", "AtlasDrawing", "plot_atlas", "plot_growth"]
 
@@ -126,7 +126,7 @@ def plot_atlas(
     Args:
         source: A result, or an atlas.
         values: One number for each chart [n]; the qualities of a result by default.
-        coordinates: Three coordinates to draw it in: see :mod:`graspatlas.viewer.figures.polygons`. By default x
+        coordinates: Three coordinates to draw it in: see :mod:`graspatlas.viewer.scene.polygons`. By default x
             itself when it has three numbers, else principal coordinates.
         singular: Charts with a smaller value are black.
         logarithmic: Whether the colour scale is logarithmic; by default when the largest value is a hundred times the

@@ -8,9 +8,9 @@ from graspatlas.result.result import Result
 from graspatlas.viewer.figures.atlas import VIEWS, AtlasDrawing
 from graspatlas.viewer.figures.ellipse import BEST, WORST, draw_ellipses, extreme_semi_axes, unit_of
 from graspatlas.viewer.figures.planar import draw_planar_grasp
-from graspatlas.viewer.figures.polygons import Coordinates
 from graspatlas.viewer.figures.portrait import common_direction, portrait
 from graspatlas.viewer.figures.style import PAGE, Picture, readable, styled
+from graspatlas.viewer.scene.polygons import Coordinates
 
 __all__ = ["plot_best_and_worst"]
 

@@ -17,8 +17,8 @@ from graspatlas.support.arrays import Array
 from graspatlas.viewer.figures.atlas import VIEWS, AtlasDrawing
 from graspatlas.viewer.figures.ellipse import draw_ellipses, extreme_semi_axes, unit_of
 from graspatlas.viewer.figures.planar import draw_planar_grasp, require_planar
-from graspatlas.viewer.figures.polygons import Coordinates, principal
 from graspatlas.viewer.figures.style import PAGE, Picture, readable, styled
+from graspatlas.viewer.scene.polygons import Coordinates, principal
 
 __all__ = ["SINGULAR_BELOW", "in_units", "plot_planar_indices", "with_index"]
 

@@ -16,8 +16,8 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.quality.batched import quality_name
 from graspatlas.result.result import Result
 from graspatlas.viewer.figures.atlas import VIEWS, AtlasDrawing
-from graspatlas.viewer.figures.polygons import Coordinates
 from graspatlas.viewer.figures.style import INK, PAGE, Picture, readable, styled
+from graspatlas.viewer.scene.polygons import Coordinates
 
 __all__ = ["plot_climbs", "plot_local_maxima"]
 

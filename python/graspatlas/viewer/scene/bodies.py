@@ -104,6 +104,17 @@ class BodyShapes:
             return bones(self._problem, q)
         return self._hand.on_links(self._problem.hand.link_placements(q))
 
+    @property
+    def has_hand(self) -> bool:
+        """Whether the hand has meshes, and is not sketched."""
+        return bool(self._hand.parts)
+
+    def carried(self) -> Iterator[tuple[Mesh, int, Array, tuple[float, float, float, float]]]:
+        """Meshes of the hand, the joint that carries each (0 is the palm), its placement there, and its colour."""
+        for part in self._hand.parts:
+            joint, T_joint_link = self._problem.hand.frame(part.link)
+            yield part.mesh, joint, T_joint_link @ part.T_link_shape, part.colour
+
     def object(self) -> Iterator[Shape]:
         """The object in its own frame."""
         return self._object.at_rest() if self._object.parts else outlines(self._problem)

@@ -8,9 +8,10 @@ import numpy as np
 
 from graspatlas.problem.problem import Problem
 from graspatlas.support.arrays import Array
+from graspatlas.support.validation import PlainTable
 from graspatlas.viewer.scene.meshes import Mesh, capsule, ellipsoid, frame_along, smooth, tube
 
-__all__ = ["Shape", "bones", "outlines"]
+__all__ = ["Shape", "bones", "outlines", "sticks"]
 
 #: A mesh, its placement (4, 4) and its colour (red, green, blue, opacity).
 Shape = tuple[Mesh, Array, tuple[float, float, float, float]]
@@ -44,6 +45,29 @@ def bones(problem: Problem, q: Array) -> Iterator[Shape]:
         if length > 1e-9:
             T = frame_along((end - start) / length, (start + end) / 2.0)
             yield capsule(BONE_RADIUS * size, length / 2.0), T, BONE
+
+
+def sticks(problem: Problem) -> PlainTable:
+    """The bones of :func:`bones` for whoever moves the joints: what they join, and how thick they are.
+
+    Returns:
+        ``bones``, each from joint ``a`` to point ``at`` (3,) of joint ``b``; the other joints' origins are where they
+        begin; ``joints`` that have a ball; radii [m] and colours.
+    """
+    import pinocchio as pin  # slow to import
+
+    model = pin.buildModelFromXML(problem.hand.tree)
+    joined = [(model.parents[j], j, np.zeros(3)) for j in range(1, model.njoints) if model.parents[j] > 0]
+    for contact in problem.contacts:
+        joint, T = problem.hand.frame(contact.frame)
+        joined.append((joint, joint, T[:3, :3] @ contact.hand.point() + T[:3, 3]))
+    size = bone_length(problem)
+    return {
+        "bones": [{"a": int(a), "b": int(b), "at": at.tolist()} for a, b, at in joined],
+        "joints": list(range(1, model.njoints)),
+        "radii": [BONE_RADIUS * size, JOINT_RADIUS * size],
+        "colours": [list(BONE), list(JOINT)],
+    }
 
 
 def bone_length(problem: Problem) -> float:

@@ -13,9 +13,10 @@ from __future__ import annotations
 import numpy as np
 
 from graspatlas.grasps.grasp import Grasp
+from graspatlas.grasps.grasps import Grasps
 from graspatlas.support.arrays import Array
 
-__all__ = ["coordinated_motions", "velocity_ellipsoid"]
+__all__ = ["coordinated_motions", "velocity_ellipsoid", "velocity_ellipsoids"]
 
 #: Singular values smaller than this share of the largest count as zero.
 RANK_TOLERANCE = 1e-9
@@ -69,3 +70,39 @@ def coordinated_motions(grasp: Grasp) -> tuple[Array, Array]:
     twists = B @ (Wt[moved].T / s[moved])
     twists[linear:] /= size
     return twists, U[:, moved]
+
+
+def velocity_ellipsoids(grasps: Grasps) -> tuple[Array, Array]:
+    """The ellipsoids of a batch; see :func:`velocity_ellipsoid`.
+
+    Args:
+        grasps: The grasps.
+
+    Returns:
+        Directions of the axes as the columns of rotations (n, 3, 3), and semi-axes (n, 3), longest first.
+    """
+    linear = grasps.problem.object_joint_model.translations
+    A = np.zeros((len(grasps), 3, 3))
+    size = np.maximum(np.abs(grasps.J).max(axis=(1, 2), initial=0.0), 1e-12)
+    G = grasps.G.copy()
+    G[:, linear:] /= size[:, None, None]
+    norm = np.linalg.norm(G, axis=(1, 2))
+    held = (np.linalg.svd(G, compute_uv=False) > RANK_TOLERANCE * norm[:, None]).sum(axis=1) == G.shape[1]
+    GT = G[held].swapaxes(1, 2)
+    joint_steps = np.linalg.pinv(grasps.J[held], rcond=RANK_TOLERANCE) @ GT
+    _, singular, Vt = np.linalg.svd(GT - grasps.J[held] @ joint_steps, full_matrices=False)
+    lost = (singular > RANK_TOLERANCE * norm[held, None]).sum(axis=1)
+    velocities = np.zeros((len(GT), 3, 3))
+    for count in np.unique(lost):  # as many motions are coordinated in all grasps of a group
+        group = lost == count
+        B = Vt[group, count:].swapaxes(1, 2)
+        _, s, Wt = np.linalg.svd(joint_steps[group] @ B, full_matrices=False)
+        moved = s > RANK_TOLERANCE * s.max(axis=1, initial=0.0)[:, None]
+        inverse = np.divide(1.0, s, out=np.zeros_like(s), where=moved)
+        twists = (B @ (Wt.swapaxes(1, 2) * inverse[:, None, :]))[:, :linear]
+        velocities[group, :linear, :linear] = twists @ twists.swapaxes(1, 2)
+    A[held] = velocities
+    values, axes = np.linalg.eigh(A)
+    axes = axes[:, :, ::-1].copy()
+    axes[np.linalg.det(axes) < 0.0, :, 2] *= -1.0
+    return axes, np.sqrt(np.maximum(values[:, ::-1], 0.0))

@@ -1,4 +1,4 @@
-"""The scene as commands of the meshcat viewer, and as one page that needs neither server nor network."""
+"""The scene as commands of the meshcat viewer, and a page of commands that needs neither server nor network."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.viewer.render.shading import FloorShadow
 from graspatlas.viewer.render.text_images import caption_image, legend_image
 from graspatlas.viewer.scene.camera import Camera
-from graspatlas.viewer.scene.captions import caption, index_name, legend, subtitle
+from graspatlas.viewer.scene.captions import caption, legend
 from graspatlas.viewer.scene.scene import SHOW_THROUGH, Colour, Part, Scene
 from graspatlas.viewer.web.threejs import Content, ground, group, light, mesh, perspective_camera, sprite
 
@@ -32,7 +32,7 @@ __all__ = [
     "filled_page",
     "floor_shadow",
     "legend_rows",
-    "page",
+    "meshcat_script",
     "png_bytes",
     "set_object",
     "studio",
@@ -57,11 +57,6 @@ THROUGH = 0.6
 LETTERS = 72.0
 #: Width of a caption compared with the distance between the grasps, and its height with that of the page.
 CAPTION_WIDTH, CAPTION_HEIGHT = 0.9, 0.115
-
-
-def page(scene: Scene) -> str:
-    """The page's text."""
-    return filled_page(scene.result.problem.name, commands(scene), legend_html(scene))
 
 
 def filled_page(name: str, commands: Iterable[Command], legend: str, player: str = "", script: str = "") -> str:
@@ -97,13 +92,6 @@ def meshcat_script() -> str:
         if script.is_file():
             return script.read_text(encoding="utf-8")
     raise GraspAtlasError("meshcat's viewer is not installed; install it with 'pip install meshcat'")
-
-
-def legend_html(scene: Scene) -> str:
-    """The page's foot: problem, status, values, colours."""
-    name, rest = subtitle(scene.result).split(": ", 1)
-    values = ", ".join(f"{e.name} {e.grasp.quality:.3g} (chart {e.grasp.chart})" for e in scene.exhibits)
-    return legend_rows(name, [rest, f"{index_name(scene.result)}: {values}"], legend())
 
 
 def legend_rows(name: str, texts: list[str], colours: list[tuple[Colour, str]]) -> str:

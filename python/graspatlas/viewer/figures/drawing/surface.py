@@ -12,8 +12,8 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from mpl_toolkits.mplot3d.axis3d import Axis
 
 from graspatlas.support.arrays import Array, BoolArray
-from graspatlas.viewer.figures.polygons import Coordinates
 from graspatlas.viewer.figures.style import INK, QUALITY, REJECTED, SINGULAR
+from graspatlas.viewer.scene.polygons import Coordinates
 
 __all__ = ["Place", "View", "add_axes", "add_polygons", "quality_colours", "scale_of"]
 

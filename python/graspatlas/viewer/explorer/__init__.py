@@ -1,0 +1,1 @@
+"""The page on which a whole atlas of grasps is looked through, with the hand beside it."""

@@ -1,0 +1,201 @@
+"""A result as one page that needs neither server nor network: the atlas, and the hand beside it.
+
+The page is put together from the files in ``scripts``, which share one scope: what they are for is said at the top of
+each. Numbers are in the page as :class:`~graspatlas.viewer.explorer.numbers.Numbers` packs them, everything else as
+JSON in which no text can end the element that it stands in.
+"""
+
+from __future__ import annotations
+
+import html
+import json
+from importlib import resources
+from string import Template
+
+import numpy as np
+
+from graspatlas.hand.urdf import root_link
+from graspatlas.problem.problem import Problem
+from graspatlas.quality.batched import quality_name
+from graspatlas.result.exports import FORMAT, FORMAT_VERSION
+from graspatlas.result.grasp_atlas import GraspAtlas
+from graspatlas.support.arrays import Array
+from graspatlas.support.validation import PlainTable
+from graspatlas.version import __version__
+from graspatlas.viewer.explorer.charts import Charts
+from graspatlas.viewer.explorer.layout import write_layout
+from graspatlas.viewer.explorer.numbers import Numbers
+from graspatlas.viewer.explorer.shapes import write_shapes
+from graspatlas.viewer.explorer.words import index_tables, requirement_label
+from graspatlas.viewer.scene.bodies import BodyShapes
+from graspatlas.viewer.scene.captions import index_name, legend, subtitle
+from graspatlas.viewer.scene.scene import (
+    COLOURS,
+    CONTACT_RADIUS,
+    ELLIPSOID_LENGTH,
+    ELLIPSOID_THICKNESS,
+    NORMAL_LENGTH,
+    NORMAL_RADIUS,
+    body_parts,
+    direction_to,
+    grasp_parts,
+    outermost,
+    size_of,
+    subject_of,
+    vertices_of,
+)
+from graspatlas.viewer.web.page import meshcat_script
+
+__all__ = ["explorer_page"]
+
+#: The page's own scripts, in the order in which they stand in it.
+SCRIPTS = (
+    "data",
+    "kinematics",
+    "walks",
+    "colours",
+    "selection",
+    "orbit",
+    "atlas_view",
+    "hand_view",
+    "plots",
+    "numbers_table",
+    "keys",
+    "main",
+)
+
+
+def explorer_page(result: GraspAtlas, chart: int | None = None) -> str:
+    """The page's text.
+
+    Args:
+        result: The result.
+        chart: The chart that it opens at; by default it opens at the best grasp, the worst beside it.
+
+    Raises:
+        GraspAtlasError: If a mesh of the hand or the object cannot be read, or there is no such chart.
+    """
+    numbers = Numbers()
+    facts = _facts(result, numbers)
+    facts["opens_at"] = None if chart is None else result.checked_chart(chart)
+    facts["numbers"] = numbers.entries  # type: ignore[assignment]  # plain data, but typed more closely
+    files = resources.files("graspatlas.viewer.explorer")
+    scripts = [(files / "scripts" / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS]
+    template = Template((files / "page.html").read_text(encoding="utf-8"))
+    return template.substitute(
+        title=html.escape(f"graspatlas: {result.problem.name}"),
+        name=html.escape(result.problem.name),
+        summary=html.escape(subtitle(result).split(": ", 1)[1]),
+        extremes=html.escape(_extremes(result)),
+        style=(files / "style.css").read_text(encoding="utf-8"),
+        meshcat=meshcat_script(),
+        facts=json.dumps(facts, allow_nan=False).replace("<", "\\u003c"),
+        numbers=numbers.text(),
+        scripts="\n".join(scripts),
+    )
+
+
+def _extremes(result: GraspAtlas) -> str:
+    """Values of the best and the worst grasp, in words."""
+    grasps = [("best", result.refined_best)] if result.refinement else []
+    if result.accepted.any():
+        grasps += [] if grasps else [("best", result.best)]
+        grasps.append(("worst", result.worst))
+    if not grasps:
+        return "no grasp meets the requirements"
+    places = [f" (chart {grasp.chart})" if grasp.chart >= 0 else "" for _, grasp in grasps]
+    values = ", ".join(f"{name} {g.quality:.3g}{place}" for (name, g), place in zip(grasps, places, strict=True))
+    return f"{index_name(result)}: {values}"
+
+
+def _facts(result: GraspAtlas, numbers: Numbers) -> PlainTable:
+    """What the page knows besides its numbers, which it writes."""
+    problem, charts = result.problem, Charts(result)
+    shapes = BodyShapes(problem)
+    charts.write(numbers)
+    maxima = result.refinement.x[: charts.n_maxima] if result.refinement else result.atlas.centers[:0]
+    requirements, _ = charts.rejections
+    friction, torsional = charts.friction
+    return {
+        "problem": problem.name,
+        "status": str(result.status),
+        "n_charts": result.atlas.n_charts,
+        "dimension": result.dimension,
+        "planar": problem.object_joint_model.planar,
+        "translations": problem.object_joint_model.translations,
+        "length_scale": problem.length_scale,
+        "indices": index_tables(result, list(charts.indices)),
+        "requirements": [{"name": name, "label": requirement_label(name)} for name in requirements],
+        "best": int(result.best.chart) if result.accepted.any() else None,
+        "worst": int(result.worst.chart) if result.accepted.any() else None,
+        "maxima": _maxima(result, charts.n_maxima),
+        "joints": [
+            {
+                "name": joint.name,
+                "parent": joint.parent,
+                "placement": joint.T_parent_joint.ravel().tolist(),
+                "axis": joint.axis.tolist(),
+                "prismatic": joint.prismatic,
+            }
+            for joint in charts.joints
+        ],
+        "contacts": [
+            {"frame": contact.frame, "joint": int(joint)}
+            for contact, joint in zip(problem.contacts, charts.contact_joints(), strict=True)
+        ],
+        "friction": friction,
+        "torsional": torsional,
+        "shapes": write_shapes(problem, shapes, numbers),
+        "layout": write_layout(result.atlas, maxima, numbers),
+        "view": _view(result, shapes),
+        "colours": {name: list(colour) for name, colour in COLOURS.items()},
+        "legend": [{"colour": list(colour), "text": text} for colour, text in legend()],
+        "file": _file_header(problem, result),
+    }
+
+
+def _maxima(result: GraspAtlas, count: int) -> list[PlainTable]:
+    """What is said of the refined maxima."""
+    refinement = result.refinement
+    if refinement is None:
+        return []
+    return [
+        {
+            "chart": int(refinement.starts[i]),
+            "status": str(refinement.statuses[i]),
+            "all_motions": refinement.all_motions,
+        }
+        for i in range(count)
+    ]
+
+
+def _view(result: GraspAtlas, shapes: BodyShapes) -> PlainTable:
+    """From where hand and object are seen, what must be in sight, and how large marks are."""
+    grasps = [result.best, result.worst] if result.accepted.any() else [result.at_x1]
+    if result.refinement:
+        grasps[0] = result.refined_best
+    size = size_of(body_parts(shapes, grasps[0]))
+    parts = [grasp_parts(shapes, grasp, size)[0] for grasp in grasps]
+    subjects = [subject_of(some, grasp, size) for some, grasp in zip(parts, grasps, strict=True)]
+    points: Array = np.concatenate([vertices_of(some, ("hand", "object", "normal")) for some in parts])
+    return {
+        "direction": direction_to(subjects, result.problem.object_joint_model).tolist(),
+        "points": outermost(points).round(4).ravel().tolist(),
+        "contact_radius": size * CONTACT_RADIUS,
+        "normal": [size * NORMAL_LENGTH, size * NORMAL_RADIUS],
+        "ellipsoid": [size * ELLIPSOID_LENGTH, size * ELLIPSOID_THICKNESS],
+    }
+
+
+def _file_header(problem: Problem, result: GraspAtlas) -> PlainTable:
+    """What stands at the top of a grasp that is copied, as in the files of ``save_grasps``."""
+    return {
+        "format": FORMAT,
+        "version": FORMAT_VERSION,
+        "graspatlas": __version__,
+        "problem": problem.name,
+        "hand": problem.hand.name,
+        "object": problem.object.name,
+        "frames": {"palm": root_link(problem.hand.urdf), "object": root_link(problem.object.urdf)},
+        "quality": quality_name(result.quality),
+    }
