@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -43,6 +44,14 @@ def bottle_result(bottle: ga.Problem) -> ga.Result:
 @pytest.fixture(scope="session")
 def small_result(bottle: ga.Problem) -> ga.Result:
     return ga.optimize(bottle, dimension=2, radius=0.2, epsilon=0.5, quality="manipulability_volume", require=[])
+
+
+@pytest.fixture(scope="session")
+def saved(tmp_path_factory: pytest.TempPathFactory, small_result: ga.Result) -> Path:
+    """The same in a file."""
+    path = tmp_path_factory.mktemp("saved") / "result.npz"
+    small_result.save(path)
+    return path
 
 
 @pytest.fixture(scope="session")

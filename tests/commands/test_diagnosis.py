@@ -15,7 +15,8 @@ import graspatlas as ga
 from graspatlas.cli import main
 from graspatlas.collision.checker import CollisionChecker
 from graspatlas.commands import diagnosis
-from graspatlas.commands.diagnosis import NOTE, OK, PROBLEM, Finding, diagnose, redundant_joints, report
+from graspatlas.commands.diagnosis import NOTE, OK, PROBLEM, Finding, diagnose, report
+from graspatlas.problem.redundancy import redundant_joints
 from graspatlas.problems import problem_text
 
 #: Bundled problems that are checked quickly.

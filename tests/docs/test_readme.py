@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from graspatlas.quality.evaluation import INDICES
+
 README = Path(__file__).parents[2] / "README.md"
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
@@ -34,6 +36,11 @@ def test_first_example(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: 
                 [float(n) for n in NUMBER.findall(said)], rel=0.1, abs=5e-3
             )
     assert (tmp_path / "can.html").stat().st_size > 1_000_000
+
+
+def test_it_counts_the_indices() -> None:
+    words = {10: "ten", 11: "eleven", 12: "twelve", 13: "thirteen", 14: "fourteen"}
+    assert f"by one of {words[len(INDICES)]} indices" in README.read_text(encoding="utf-8")
 
 
 def test_it_is_one_screen_and_a_half() -> None:

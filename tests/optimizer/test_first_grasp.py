@@ -53,6 +53,7 @@ def test_it_meets_the_requirements_away_from_all_ends(name: str) -> None:
     assert min(shares_to_the_ends(found)) >= PROBLEMS[name] - 1e-6
     assert np.abs(found.full_system.evaluate_residual(found.x1_array)).max() < 1e-9
     assert np.abs(found.frozen_residual(found.x1_array, k)).max(initial=0.0) < 1e-9
+    assert ga.build_atlas(found.system(k), found.start(k), radius=0.2, epsilon=0.5, max_charts=20).n_charts == 20
     again = with_good_first_grasp(problem, k, problem.requirements)
     np.testing.assert_array_equal(again.x1_array, found.x1_array)
 
@@ -73,6 +74,14 @@ def test_requirements_that_nothing_meets_leave_a_feasible_one() -> None:
     assert "misses force_closure:0.5:10" in marks["requirements"].text
 
 
+def test_it_lies_anywhere_where_the_mean_posture_leaves_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where nothing meets the requirements."""
+    monkeypatch.setattr("graspatlas.optimizer.first_grasp.BATCHES", 1)
+    found = with_good_first_grasp(bare("planar_hand"), 2, (lambda grasp: False,))
+    assert np.abs(found.full_system.evaluate_residual(found.x1_array)).max() < 1e-9
+    assert ga.build_atlas(found.system(2), found.start(2), radius=0.1, epsilon=0.5, max_charts=20).n_charts == 20
+
+
 def test_the_nearest_to_the_guess_is_taken() -> None:
     known = ga.load_problem("schunk_can")
     assert known.x1 is not None
@@ -83,6 +92,23 @@ def test_the_nearest_to_the_guess_is_taken() -> None:
     assert np.linalg.norm(np.subtract(found.object_xyz, guess.xyz)) < 0.02
     grasps = ga.Grasps(known, known.at(with_good_first_grasp(problem, 2, known.requirements).x1_array).x1_array[None])
     assert all(requirement.met(grasps)[0] for requirement in known.requirements)
+
+
+def test_one_from_which_no_atlas_of_that_dimension_grows_is_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where it was found among all feasible grasps: there it may be regular all the same."""
+    asked: list[tuple[int, np.ndarray]] = []
+
+    def can_grow(system: ga.System, x: np.ndarray) -> bool:
+        asked.append((system.dimension, x))
+        return len(asked) > 3
+
+    monkeypatch.setattr("graspatlas.optimizer.first_grasp.can_grow", can_grow)
+    problem = bare("planar_hand")
+    found = with_good_first_grasp(problem, 2, problem.requirements)
+    assert [dimension for dimension, _ in asked] == [2, 2, 2, 2]
+    np.testing.assert_array_equal(found.x1_array, asked[3][1])
+    slice_of_the_mean = replace(problem, reference=problem.reference_posture)
+    assert np.abs(slice_of_the_mean.frozen_residual(found.x1_array, 2)).max() > 1e-3, "found among all"
 
 
 def test_one_that_is_far_from_the_guess_is_pointed_out() -> None:

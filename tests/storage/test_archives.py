@@ -12,16 +12,6 @@ import pytest
 import graspatlas as ga
 from graspatlas.storage.archives import DamagedArchive, read_arrays
 
-#: Modules of the standard library, and others, that the viewer or a worker imports.
-PLANTED = ("html", "secrets", "pickle", "socket", "multiprocessing", "tornado", "zmq", "numpy", "base64", "selectors")
-
-
-@pytest.fixture(scope="module")
-def saved(tmp_path_factory: pytest.TempPathFactory, small_result: ga.Result) -> Path:
-    path = tmp_path_factory.mktemp("saved") / "result.npz"
-    small_result.save(path)
-    return path
-
 
 def rewritten(saved: Path, path: Path, **arrays: object) -> Path:
     with np.load(saved) as file:

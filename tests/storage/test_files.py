@@ -15,16 +15,6 @@ from graspatlas.cli import main
 from graspatlas.storage.files import replaced
 from graspatlas.viewer import export_html, save_picture
 
-#: Modules of the standard library, and others, that the viewer or a worker imports.
-PLANTED = ("html", "secrets", "pickle", "socket", "multiprocessing", "tornado", "zmq", "numpy", "base64", "selectors")
-
-
-@pytest.fixture(scope="module")
-def saved(tmp_path_factory: pytest.TempPathFactory, small_result: ga.Result) -> Path:
-    path = tmp_path_factory.mktemp("saved") / "result.npz"
-    small_result.save(path)
-    return path
-
 
 def special(kind: str, path: Path) -> None:
     """Put something at a path that is no file."""

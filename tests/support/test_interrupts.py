@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -205,6 +206,36 @@ def test_a_press_is_heard_after_a_block_that_holds_it() -> None:
             press()
         steps.append("later")
     assert steps[-1] == "later"
+
+
+IMPORTING = """
+def cb(_):
+    signal.raise_signal(signal.SIGINT)
+    for _ in range(3):
+        pass
+"""
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_press_in_the_middle_of_an_import_is_not_lost() -> None:
+    """Python ignores what is raised in the callback with which its import system gives a lock back."""
+    names: dict[str, Any] = {"signal": signal}
+    exec(compile(IMPORTING, "<frozen importlib._bootstrap>", "exec"), names)
+
+    class Lock:
+        pass
+
+    @stoppable()
+    def work() -> None:
+        lock = Lock()
+        there = weakref.ref(lock, names["cb"])
+        del lock
+        assert there() is None
+        for _ in range(5000):
+            time.sleep(0.001)
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
 
 
 def test_inner_blocks_are_parts_of_the_outer_one() -> None:

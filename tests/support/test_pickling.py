@@ -16,6 +16,7 @@ import graspatlas as ga
 from graspatlas import _core, patches
 from graspatlas.analysis.densify import densify
 from graspatlas.atlas.verification import check_atlas
+from graspatlas.problem.assembly import random_points
 from graspatlas.quality import evaluate
 from graspatlas.systems import Angles, AnySystem, Rotations, Sphere, Torus
 
@@ -166,7 +167,8 @@ def test_grasp_systems(name, again):
     problem = ga.load_problem(name)
     for system in (problem.full_system, problem.system(problem.defaults.get("dimension", problem.largest_dimension))):
         other = again(system)
-        x = system.integrate(problem._random_points(1)[0], np.full(system.tangent_size, 0.1))
+        (start,) = random_points(problem.full_system, problem.reference_array, problem.object_joint_model, 1)
+        x = system.integrate(start, np.full(system.tangent_size, 0.1))
         assert other.bound_names == system.bound_names
         assert same(dict(other.grasp_arrays(x[None])), dict(system.grasp_arrays(x[None])))
         for of in ("evaluate_residual", "evaluate_jacobian", "slack", "embed"):

@@ -41,13 +41,6 @@ def command(tmp_path: Path) -> list[str]:
     return [sys.executable, str(script)]
 
 
-@pytest.fixture(scope="module")
-def saved(tmp_path_factory: pytest.TempPathFactory, small_result: ga.Result) -> Path:
-    path = tmp_path_factory.mktemp("saved") / "result.npz"
-    small_result.save(path)
-    return path
-
-
 def listening(pid: int) -> set[str]:
     """Addresses on which a process listens, as Linux lists them."""
     own = {os.readlink(entry) for entry in Path(f"/proc/{pid}/fd").iterdir() if entry.is_symlink()}

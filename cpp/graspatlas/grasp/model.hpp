@@ -13,6 +13,9 @@ struct JointInfo {
   std::string name;
   int q_index, q_size, v_index, v_size;
   bool prismatic;  ///< its q is a length [m]
+
+  /// Whether its numbers may be compared one by one: those of quaternions, whose negatives are the same, may not.
+  bool comparable() const { return q_size == v_size || q_size == 2; }
 };
 
 struct FrameInfo {

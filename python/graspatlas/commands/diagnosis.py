@@ -16,20 +16,14 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.optimizer.first_grasp import with_good_first_grasp
 from graspatlas.problem.problem import Problem
+from graspatlas.problem.redundancy import near_x1, null_space, redundant_joints
 from graspatlas.requirements.base import asked
 from graspatlas.search.random_starts import hand_size
-from graspatlas.support.arrays import Array
 
-__all__ = ["NOTE", "OK", "PROBLEM", "Finding", "diagnose", "redundant_joints", "report"]
+__all__ = ["NOTE", "OK", "PROBLEM", "Finding", "diagnose", "report"]
 
 
 OK, NOTE, PROBLEM = "ok", "note", "problem"
-#: A singular value below this share of the largest one is zero.
-RANK_TOLERANCE = 1e-8
-#: A joint takes part in a motion when it has at least this share of the fastest joint's velocity.
-TAKES_PART = 1e-3
-#: How far from x1 the freedoms are looked at again, since x1 may be singular [rad, or lengths / length_scale].
-AWAY = 0.1
 #: A joint or parameter this near its limit is pointed out [rad, or lengths / length_scale].
 NEAR_LIMIT = 0.02
 #: A contact point this far from the collision shape that it should lie on is pointed out; shapes approximate [m].
@@ -246,52 +240,10 @@ def _with_contact(bound: str, problem: Problem) -> str:
     return of + names[int(number)]
 
 
-def redundant_joints(problem: Problem) -> list[list[str]]:
-    """Joints that can move together without any contact point or normal of the hand moving.
-
-    They are the null space of the contact Jacobian, restricted to the joints, near x1 but not at x1 itself: there a
-    straight finger, say, has motions that are felt everywhere else.
-
-    Args:
-        problem: A problem with a first grasp.
-
-    Returns:
-        For each independent motion the names of the joints that take part.
-    """
-    actuated = problem.hand.mechanism.actuated
-    motions = _null_space(problem.full_system.evaluate_jacobian(_near_x1(problem))[:, : len(actuated)])
-    return [[actuated[j] for j in _taking_part(motion)] for motion in motions]
-
-
-def _near_x1(problem: Problem) -> Array:
-    """A configuration near x1 that is not singular; its contacts are open."""
-    system = problem.full_system
-    step = AWAY * np.random.default_rng(0).uniform(-1.0, 1.0, system.tangent_size)
-    return np.asarray(system.integrate(problem.x1_array, step))
-
-
-def _null_space(J: Array) -> Array:
-    """Rows that span the null space of J, made sparse by Gauss-Jordan elimination [n, columns]."""
-    _, singular, vectors = np.linalg.svd(J)
-    rank = int((singular > RANK_TOLERANCE * max(singular[0], 1.0)).sum()) if len(singular) else 0
-    rows = vectors[rank:].copy()
-    for i in range(len(rows)):
-        column = int(np.abs(rows[i]).argmax())
-        rows[i] /= rows[i, column]
-        for other in range(len(rows)):
-            if other != i:
-                rows[other] -= rows[other, column] * rows[i]
-    return np.asarray(rows)
-
-
-def _taking_part(motion: Array) -> list[int]:
-    return [int(j) for j in np.flatnonzero(np.abs(motion) >= TAKES_PART * np.abs(motion).max())]
-
-
 def _redundancies(problem: Problem) -> Iterator[Finding]:
     h, groups = len(problem.hand.mechanism.actuated), redundant_joints(problem)
-    J_x1, J_near = (problem.full_system.evaluate_jacobian(x) for x in (problem.x1_array, _near_x1(problem)))
-    extra = len(_null_space(J_x1[:, :h])) - len(groups)
+    J_x1, J_near = (problem.full_system.evaluate_jacobian(x) for x in (problem.x1_array, near_x1(problem)))
+    extra = len(null_space(J_x1[:, :h])) - len(groups)
     if groups:
         text = "; ".join(" with ".join(group) for group in groups)
         hint = "they move no contact, and the atlas traces them needlessly: lock joints (hand: locked)"
@@ -302,7 +254,7 @@ def _redundancies(problem: Problem) -> Iterator[Finding]:
         yield Finding(NOTE, "redundancies", text, hint)
     else:
         yield Finding(OK, "redundancies", "none: every joint velocity moves a contact", "nothing is traced needlessly")
-    loose = min(len(_null_space(J[:, h:])) for J in (J_x1, J_near))
+    loose = min(len(null_space(J[:, h:])) for J in (J_x1, J_near))
     if loose:
         text = f"it can move in {loose} way{'s' if loose > 1 else ''} while the hand stays still"
         hint = "symmetric objects do: freeze u or v of one contact, or the atlas repeats its grasps"

@@ -2,9 +2,9 @@
 
 Of grasps drawn at random nearly none meets requirements such as force closure or no collision, and most lie at a joint
 limit or at the rim of a patch, where an atlas ends as soon as it begins. So those that miss them least climb until they
-meet them, first with room to all limits and rims, then without. Those near the pose guess, if there is one,
-start first, and the nearest to it is taken. Where the mean posture leaves no grasp in which the frozen hand motions are
-its own, and no reference says that they must be, any feasible grasp will do: the frozen motions are then those of it.
+meet them, first with room to all limits and rims, then without. Those near the pose guess, if there is one, start
+first, and the nearest to it is taken. Where the mean posture leaves no grasp in which the frozen hand motions are its
+own, and no reference says that they must be, any feasible grasp will do: the frozen motions are then those of it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from graspatlas.problem.object_joint import ObjectJoint
 from graspatlas.problem.pose_guess import PoseGuess
 from graspatlas.problem.problem import Problem
 from graspatlas.requirements.base import RequirementLike
-from graspatlas.search.grasp_search import GraspSearch, with_first_grasp
+from graspatlas.search.grasp_search import GraspSearch, can_grow, with_first_grasp
 from graspatlas.search.random_starts import hand_size
 from graspatlas.support.arrays import Array
 from graspatlas.support.deadlines import deadline_after, seconds_until
@@ -69,15 +69,22 @@ def with_good_first_grasp(
         return problem
     deadline = deadline_after(max_seconds)
     free = problem.reference is None and problem.frozen_motions(dimension) > 0
+    dimensions = (dimension, problem.largest_dimension) if free else (dimension,)
+    reached: list[int] = []
     with progress_bar("tries at a first grasp", progress=progress) as bar:
         for room in ROOMS:
-            for k in (dimension, problem.largest_dimension) if free else (dimension,):
+            for k in dimensions:
                 search = GraspSearch(problem, k, 0, room)
-                x = _meeting(search, tuple(requirements), deadline, bar)
-                if x is not None:
-                    return (search.problem if k == dimension else problem).at(x)
+                stated = search.problem if k == dimension else problem
+                for x in _meeting(search, tuple(requirements), deadline, bar):
+                    found = stated.at(x)
+                    if can_grow(found.system(dimension), found.start(dimension)):
+                        return found
+                reached += [k] if search.found else []
+    k = dimension if dimension in reached else dimensions[-1]
     try:
-        return with_first_grasp(problem, dimension, seconds_until(deadline, SHORTEST), progress)
+        found = with_first_grasp(problem, k, seconds_until(deadline, SHORTEST), progress)
+        return found if k == dimension else problem.at(found.x1_array)
     except GraspAtlasError as error:
         blocking = _couplings_that_leave_none(problem)
         raise GraspAtlasError(f"{error}{blocking}") from None
@@ -85,20 +92,15 @@ def with_good_first_grasp(
 
 def _meeting(
     search: GraspSearch, requirements: tuple[RequirementLike, ...], deadline: float, bar: ProgressBar
-) -> Array | None:
-    """A grasp that meets the requirements and from which an atlas can grow (size of x,); None where none is found."""
+) -> Iterator[Array]:
+    """Grasps that meet the requirements (size of x,), those that are the better first grasps before others."""
     objective = Objective(search.problem, search.system, INDEX, requirements, FIRST_STEP)
     score = _score(search)
     for X in _batches(search, bar):
         if time.perf_counter() > deadline:
-            return None
-        if not len(X):
-            continue
-        for ends in _ends(objective, X, deadline):
-            for i in np.argsort([score(x) for x in ends], kind="stable"):
-                if search.is_regular(ends[i]):
-                    return np.asarray(ends[i])
-    return None
+            return
+        for ends in _ends(objective, X, deadline) if len(X) else ():
+            yield from (ends[i] for i in np.argsort([score(x) for x in ends], kind="stable"))
 
 
 def _batches(search: GraspSearch, bar: ProgressBar) -> Iterator[Array]:

@@ -19,6 +19,8 @@ __all__ = ["frozen_residual", "grasp_system", "jacobian_rank", "joint_units", "m
 
 #: Singular values smaller than this share of the largest count as zero.
 RANK_TOLERANCE = 1e-8
+#: Random configurations at which the rank of the contact equations is looked at when there is no x1.
+RANK_TRIES = 5
 
 
 def joint_units(hand: Hand, length_scale: float) -> Array:
@@ -64,7 +66,7 @@ def jacobian_rank(J: Array) -> int:
     return int((singular > RANK_TOLERANCE * singular[0]).sum())
 
 
-def random_points(system: _core.GraspSystem, q: Array, joint: ObjectJoint, count: int) -> list[Array]:
+def random_points(system: _core.GraspSystem, q: Array, joint: ObjectJoint, count: int = RANK_TRIES) -> list[Array]:
     """Configurations near a posture q (nq,) that touch nothing; their bounds are not looked at."""
     rng = np.random.default_rng(0)
     x = np.r_[q, joint.neutral, np.zeros(system.n_parameters)]

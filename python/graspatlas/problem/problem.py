@@ -50,8 +50,6 @@ __all__ = ["Problem"]
 
 #: How far a first grasp may be off the hand motions that are frozen at the reference posture [rad].
 FROZEN_TOLERANCE = 1e-9
-#: Random configurations at which the rank of the contact equations is looked at when there is no x1.
-RANK_TRIES = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +186,10 @@ class Problem(Light):
         That is the rank at x1; without x1 the largest at random configurations, in contact or not.
         """
         system, place = self.full_system, "at x1" if self.x1 is not None else "anywhere"
-        points = [self.x1_array] if self.x1 is not None else self._random_points(RANK_TRIES)
+        if self.x1 is not None:
+            points = [self.x1_array]
+        else:
+            points = random_points(system, self.reference_array, self.object_joint_model)
         rank = max(jacobian_rank(system.evaluate_jacobian(x)) for x in points)
         if rank < system.n_equations:
             raise GraspAtlasError(
@@ -202,10 +203,6 @@ class Problem(Light):
     def largest_dimension(self) -> int:
         """Largest possible k: t less the couplings, which are always frozen."""
         return self.full_dimension - (len(self.motions.couplings) if self.motions is not None else 0)
-
-    def _random_points(self, count: int) -> list[Array]:
-        """Configurations near the reference posture that touch nothing; their bounds are not looked at."""
-        return random_points(self.full_system, self.reference_array, self.object_joint_model, count)
 
     def frozen_motions(self, dimension: int) -> int:
         """How many hand motions are frozen for a manifold of dimension k: s = t - k (eq 12).
@@ -376,9 +373,8 @@ class Problem(Light):
             "requirements",
             "x1",
             "reference",
-            "torque_length",
         )
-        table = checked_table(data, "the problem", ("name", "hand", "object", "contacts"), optional)
+        table = checked_table(data, "the problem", ("name", "hand", "object", "contacts"), (*optional, "torque_length"))
         body = dict(checked_table(table["object"], "the object", ("urdf",), None))
         object_joint, guess = str(body.pop("joint", "free_flyer")), body.pop("pose_guess", None)
         motions = table.get("hand_motions")

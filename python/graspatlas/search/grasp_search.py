@@ -24,7 +24,7 @@ from graspatlas.support.interrupts import stoppable
 from graspatlas.support.progress import ProgressBar, progress_bar
 from graspatlas.support.validation import whole
 
-__all__ = ["MAX_TRIES", "GraspSearch", "find_grasps", "with_first_grasp"]
+__all__ = ["MAX_TRIES", "GraspSearch", "can_grow", "find_grasps", "with_first_grasp"]
 
 #: Tries in a row without a grasp after which a search is given up: about half a minute.
 MAX_TRIES = 20_000
@@ -111,6 +111,15 @@ def with_first_grasp(
     return search.problem.at(x)
 
 
+def can_grow(system: _core.GraspSystem, x: Array) -> bool:
+    """Whether an atlas can grow from a grasp: see :meth:`GraspSearch.is_regular`."""
+    try:
+        _core.AtlasBuilder(system, x, TRIAL_RADIUS, TRIAL_EPSILON, 1)
+    except GraspAtlasError:
+        return False
+    return True
+
+
 class GraspSearch:
     """Tries at feasible grasps of one problem and dimension, one after another.
 
@@ -169,11 +178,7 @@ class GraspSearch:
 
     def is_regular(self, x: Array) -> bool:
         """False for a singular grasp, at which the equations lose rank, or so nearly that it slips across a bound."""
-        try:
-            _core.AtlasBuilder(self.system, x, TRIAL_RADIUS, TRIAL_EPSILON, 1)
-        except GraspAtlasError:
-            return False
-        return True
+        return can_grow(self.system, x)
 
     def attempt(self) -> Array | None:
         """One try: a feasible grasp (size of x,), or None."""

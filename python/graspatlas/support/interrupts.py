@@ -9,6 +9,7 @@ Handlers are installed in the main thread only, only in place of Python's own, a
 
 from __future__ import annotations
 
+import _thread
 import os
 import signal
 import sys
@@ -26,6 +27,8 @@ Handler: TypeAlias = "Callable[[int, FrameType | None], object] | int | signal.H
 
 #: Signals that come so soon after one that was heard are the same press of a key [s].
 SAME_PRESS = 0.4
+#: A signal that came where nothing can be raised comes again after this [s].
+SOON = 0.01
 
 
 class _Watch:
@@ -40,6 +43,9 @@ class _Watch:
 
     def hear(self, number: int, frame: FrameType | None) -> None:
         """The handler; it runs between two steps of Python's main thread."""
+        if _is_swallowing(frame):
+            threading.Timer(SOON, _thread.interrupt_main, (number,)).start()
+            return
         now = time.monotonic()
         if now - self.last < SAME_PRESS:
             return
@@ -148,6 +154,12 @@ def keeping(**kept: object) -> Iterator[None]:
         if new and add_note:
             add_note(f"What took long to make is not lost: see this error's {' and '.join(new)}.")
         raise
+
+
+def _is_swallowing(frame: FrameType | None) -> bool:
+    """Whether a signal came into the callback by which imports give locks back: what that raises, Python ignores."""
+    code = frame.f_code if frame else None
+    return code is not None and (code.co_name, code.co_filename) == ("cb", "<frozen importlib._bootstrap>")
 
 
 def _in_main_thread() -> bool:
