@@ -40,13 +40,17 @@ def tube(middle: Array, radii: Array, squash: float = 1.0) -> trimesh.Trimesh:
     n = len(middle)
     i, j = np.meshgrid(np.arange(n - 1), np.arange(ROUND), indexing="ij")
     a, b = ROUND * i + j, ROUND * i + (j + 1) % ROUND
-    sides = np.concatenate([np.stack([a, b, b + ROUND], -1).reshape(-1, 3), np.stack([a, b + ROUND, a + ROUND], -1).reshape(-1, 3)])
+    sides = np.concatenate(
+        [np.stack([a, b, b + ROUND], -1).reshape(-1, 3), np.stack([a, b + ROUND, a + ROUND], -1).reshape(-1, 3)]
+    )
     first, last = n * ROUND, n * ROUND + 1
     k = np.arange(ROUND)
-    caps = np.concatenate([
-        np.stack([np.full(ROUND, first), (k + 1) % ROUND, k], -1),
-        np.stack([np.full(ROUND, last), (n - 1) * ROUND + k, (n - 1) * ROUND + (k + 1) % ROUND], -1),
-    ])
+    caps = np.concatenate(
+        [
+            np.stack([np.full(ROUND, first), (k + 1) % ROUND, k], -1),
+            np.stack([np.full(ROUND, last), (n - 1) * ROUND + k, (n - 1) * ROUND + (k + 1) % ROUND], -1),
+        ]
+    )
     mesh = trimesh.Trimesh(np.concatenate([rings.reshape(-1, 3), middle[[0, -1]]]), np.concatenate([sides, caps]))
     mesh.fix_normals()
     return mesh
@@ -66,9 +70,18 @@ def bottle() -> trimesh.Trimesh:
     """A bottle of 6 cm across and 20 cm high, with shoulders and a cap."""
     t = np.linspace(0.0, 1.0, 12)
     shoulder = [(0.030 - 0.018 * (3 * s**2 - 2 * s**3), 0.130 + 0.035 * s) for s in t]
-    return turned([
-        (0.0, 0.0), (0.027, 0.0), (0.030, 0.003), *shoulder, (0.012, 0.175), (0.0145, 0.176), (0.0145, 0.199), (0.0, 0.2)
-    ])
+    return turned(
+        [
+            (0.0, 0.0),
+            (0.027, 0.0),
+            (0.030, 0.003),
+            *shoulder,
+            (0.012, 0.175),
+            (0.0145, 0.176),
+            (0.0145, 0.199),
+            (0.0, 0.2),
+        ]
+    )
 
 
 def drill() -> trimesh.Trimesh:

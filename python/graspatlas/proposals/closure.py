@@ -33,7 +33,7 @@ def imbalance(points: Array, normals: Array, friction: float) -> Array:
 def _imbalance(points: Array, normals: Array, friction: float) -> Array:
     wrenches = _edges(points, normals, friction)
     w = wrenches.mean(axis=1)
-    for step in range(STEPS):
+    for _ in range(STEPS):
         lowest = np.einsum("nec,nc->ne", wrenches, w).argmin(axis=1)
         to = wrenches[np.arange(len(w)), lowest] - w
         # As far as the wrench becomes smaller, and never past the edge.

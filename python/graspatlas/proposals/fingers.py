@@ -126,7 +126,7 @@ def grips(hand: Hand, count: int | None = None, links: Sequence[str] | None = No
 def _rest(
     hand: Hand, closing: Closing, others: Sequence[int], pads: Sequence[Pad], moving: set[str]
 ) -> dict[str, float]:
-    """Where the joints are that do not move: those of other fingers open, all else at 0 or as near to it as they can."""
+    """Where the joints are that do not move: those of other fingers open, all else as near to 0 as they can."""
     ranges = {name: _finite(*pair) for name, pair in hand.limits_by_name.items()}
     followers = hand.mechanism.followers
     driven = {followers[name].driver for name in moving if name in followers}

@@ -105,7 +105,8 @@ def propose(
     kept = KeptLooks(folder / "looks", plan, setting.assignments)
     looks, end = _looks(plan, setting.assignments, kept, start, deadline, progress)
     tried = tuple(_tried(each, look) for each, look in zip(setting.assignments, looks, strict=False))
-    best = sorted((i for i, look in enumerate(looks) if look.end is LookEnd.MET), key=lambda i: -looks[i].value)[:top]
+    met = [i for i, look in enumerate(looks) if look.end is LookEnd.MET]
+    best = sorted(met, key=lambda i: -looks[i].value)[:top]
     proposals: list[Proposal] = []
     with progress_bar("atlases", total=len(best), progress=progress) as bar:
         for number, i in enumerate(best):
