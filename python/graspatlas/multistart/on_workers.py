@@ -11,9 +11,10 @@ from collections.abc import Generator
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
+from graspatlas.cluster import sealing
 from graspatlas.cluster.client import connected
 from graspatlas.cluster.numbered_tasks import NumberedTasks
-from graspatlas.errors import GraspAtlasError
+from graspatlas.cluster.sealing import check_version
 from graspatlas.multistart.rounds import Plan, Round, run_round
 from graspatlas.multistart.search import MOST_ROUNDS
 from graspatlas.quality.batched import quality_name
@@ -58,27 +59,14 @@ def sealed(plan: Plan) -> bytes:
     Raises:
         GraspAtlasError: If a function cannot be pickled.
     """
-    import cloudpickle
-
-    parts: dict[str, object] = {f"the index {quality_name(plan.quality)}": plan.quality}
-    parts.update({f"the requirement {requirement_name(each)}": each for each in plan.requirements})
-    for name, part in parts.items():
-        try:
-            cloudpickle.dumps(part)
-        except Exception as error:
-            raise GraspAtlasError(
-                f"{name} cannot be sent to workers ({type(error).__name__}: {error}): let it hold plain data alone, "
-                "and open what it needs when it is called; or search without workers"
-            ) from None
-    return bytes(cloudpickle.dumps(plan))
+    functions: dict[str, object] = {f"the index {quality_name(plan.quality)}": plan.quality}
+    functions.update({f"the requirement {requirement_name(each)}": each for each in plan.requirements})
+    return sealing.sealed(plan, functions, "search without workers")
 
 
 def _round_on_worker(version: str, plan: bytes, number: int, max_seconds: float | None) -> Round:
     """A round; a worker has many threads where it is to do many at a time, so each takes one."""
-    if version != __version__:
-        raise GraspAtlasError(
-            f"a worker has graspatlas {__version__} and this process {version}: install the same version on both"
-        )
+    check_version(version)
     return run_round(_opened(plan), number, max_seconds)
 
 

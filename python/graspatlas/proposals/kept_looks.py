@@ -7,7 +7,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from graspatlas.proposals.matching import Assignment
+from graspatlas.proposals.assignments.matching import Assignment
 from graspatlas.proposals.plan import Plan
 from graspatlas.proposals.trial import Look, LookEnd
 from graspatlas.quality.batched import quality_name

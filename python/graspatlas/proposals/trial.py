@@ -19,8 +19,8 @@ from graspatlas.optimizer.optimize import optimize
 from graspatlas.problem.contacts import Contact
 from graspatlas.problem.problem import Problem
 from graspatlas.problem.requirement import StatedRequirement
-from graspatlas.proposals.fingers import touched
-from graspatlas.proposals.matching import Assignment
+from graspatlas.proposals.assignments.fingers import touched
+from graspatlas.proposals.assignments.matching import Assignment
 from graspatlas.proposals.pinning import pinned
 from graspatlas.proposals.plan import Plan
 from graspatlas.quality.batched import quality_name
