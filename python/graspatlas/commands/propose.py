@@ -57,7 +57,6 @@ def _propose(options: argparse.Namespace) -> int:
     say(json.dumps(found.to_dict()) if options.json else "\n".join(_lines(found)))
     say(f"wrote {options.output / PAGE}: open it in a browser", file=sys.stderr)
     if found.status is ProposalsEnd.INTERRUPTED:
-        say("interrupted: start it again with the same arguments to go on", file=sys.stderr)
         return INTERRUPTED
     return 0 if found.proposals else FAILED
 
@@ -67,6 +66,9 @@ def _lines(found: Proposals) -> list[str]:
     lines = [*found.notes, str(found.counts), found.summary()]
     for proposal in found.proposals:
         lines.append(f"  {proposal.quality:10.5g}  {proposal.tried.name}  ({proposal.folder.name})")
+    left = found.counts.left - len(found.tried)
+    if left:
+        lines.append(f"{left} assignments are left: start it again with the same arguments to look at more of them")
     if not found.proposals:
         lines.append("no grasp was found that meets the requirements:")
         lines += [f"  {count:5} assignments: {reason}" for reason, count in found.refusals().items()]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import os
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from string import Template
@@ -11,15 +12,20 @@ from urllib.parse import quote
 
 from graspatlas.proposals.outcome import Proposal, Proposals
 from graspatlas.quality.batched import quality_name
+from graspatlas.regions.region import Region
 from graspatlas.storage.files import replaced
 from graspatlas.viewer import export_html, save_picture
+from graspatlas.viewer.render.regions import draw_regions
 
-__all__ = ["GRASPS", "PICTURE", "write_page", "write_views"]
+__all__ = ["GRASPS", "PICTURE", "REGIONS", "write_page", "write_regions", "write_views"]
 
 #: What lies in the folder of a proposal to look at.
 PICTURE, GRASPS = "grasp.png", "grasps.html"
-#: Size of a picture [pixels].
+#: The picture of the object's regions, beside the page.
+REGIONS = "regions.png"
+#: Size of a picture of a grasp, and of that of the regions [pixels].
 WIDTH, HEIGHT = 960, 600
+REGIONS_WIDTH, REGIONS_HEIGHT = 1400, 700
 
 
 def write_views(proposal: Proposal) -> None:
@@ -30,6 +36,16 @@ def write_views(proposal: Proposal) -> None:
     """
     save_picture(proposal.result, proposal.folder / PICTURE, width=WIDTH, height=HEIGHT, worst=False)
     export_html(proposal.result, proposal.folder / GRASPS)
+
+
+def write_regions(regions: Sequence[Region], path: Path) -> None:
+    """Write the picture of the regions, in colours with their names.
+
+    Raises:
+        GraspAtlasError: If it cannot be written.
+    """
+    with replaced(path) as stream:
+        draw_regions(regions, None, REGIONS_WIDTH, REGIONS_HEIGHT).save(stream, "PNG")
 
 
 def write_page(found: Proposals, title: str, path: Path) -> None:
@@ -47,6 +63,7 @@ def write_page(found: Proposals, title: str, path: Path) -> None:
     text = template.substitute(
         title=html.escape(title),
         summary=html.escape(found.summary()),
+        regions=f'<img src="{REGIONS}" width="{REGIONS_WIDTH}" height="{REGIONS_HEIGHT}" alt="regions of the object">',
         cards="\n".join(_card(rank, each, path.parent) for rank, each in enumerate(found.proposals, start=1)),
         notes=_notes(found),
         counts=html.escape(str(found.counts)),

@@ -18,6 +18,7 @@ class Plan(Light):
     """What all assignments of one hand and one object have in common.
 
     Attributes:
+        hand: Name of the hand.
         source: How a problem file names the hand: ``{"urdf": path}`` and so on.
         body: The object.
         quality: The index that ranks proposals.
@@ -27,6 +28,7 @@ class Plan(Light):
         seed: Of the random numbers.
     """
 
+    hand: str
     source: Mapping[str, str]
     body: Body
     quality: Quality

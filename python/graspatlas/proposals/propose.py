@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from graspatlas.cluster.client import need
@@ -16,7 +15,7 @@ from graspatlas.proposals.files import folder_name, problem_file, write_text
 from graspatlas.proposals.kept_looks import KeptLooks
 from graspatlas.proposals.looks import OnWorkers, here, looks_at
 from graspatlas.proposals.outcome import Proposal, Proposals, ProposalsEnd, Tried
-from graspatlas.proposals.page import write_page, write_views
+from graspatlas.proposals.page import REGIONS, write_page, write_regions, write_views
 from graspatlas.proposals.plan import Plan
 from graspatlas.proposals.setting import made_ready
 from graspatlas.proposals.trial import Look, LookEnd, atlas_of
@@ -35,15 +34,18 @@ from graspatlas.support.validation import whole
 
 __all__ = ["MAX_SECONDS", "PAGE", "TABLE", "TOP", "propose"]
 
-#: Time for all of it, and the share of it that first looks may take.
+#: Time for all of it, and the least share of it that first looks may take.
 MAX_SECONDS, LOOKING = 90.0, 0.5
 #: Grasps that are proposed.
 TOP = 5
 #: What is required where nothing is said.
 REQUIREMENTS = (ForceClosure(0.5, 0.02), CollisionFree())
-#: Time that pictures and pages of a proposal take, about, and what is written of all [s].
-VIEWING = 2.0
+#: Time that an atlas takes, about, and the picture and the page of its grasps [s].
+GROWING, VIEWING = 4.0, 2.0
+#: Files about all of it.
 PAGE, TABLE = "proposals.html", "proposals.csv"
+#: Files of a proposal.
+PROBLEM, RESULT = "problem.yaml", "result.npz"
 #: Time that an atlas is given where none is left [s].
 SHORTEST = 1.0
 
@@ -107,9 +109,9 @@ def propose(
         need("looking at assignments on workers", "dask.distributed")
     folder = writable_folder(output)
     setting = made_ready(named_hand(os.fspath(hand)), Path(mesh), scale, folder, fingers, links, seed)
-    plan = Plan(setting.source, setting.body, quality, tuple(require), seed=seed)
+    plan = Plan(setting.hand, setting.source, setting.body, quality, tuple(require), seed=seed)
     kept = KeptLooks(folder / "looks", plan, setting.assignments)
-    until = deadline if max_seconds is None else start + LOOKING * (deadline - start)
+    until = max(deadline - top * (GROWING + VIEWING), start + LOOKING * (max_seconds or 0.0))
     with progress_bar("assignments", total=len(setting.assignments), progress=progress) as bar:
         looks, end = looks_at(plan, setting.assignments, kept, looker, until, deadline, bar)
     tried = tuple(_tried(each, look) for each, look in zip(setting.assignments, looks, strict=False))
@@ -117,19 +119,15 @@ def propose(
     if end is not ProposalsEnd.INTERRUPTED:
         results, atlases_end = _atlases(plan, setting.assignments, looks, top, deadline - top * VIEWING, progress)
         end = end if atlases_end is ProposalsEnd.COMPLETE else atlases_end
-    proposals = sorted((Proposal(tried[i], result, folder) for i, result in results.items()), key=lambda p: -p.quality)
-    locked = {each.name: each.fingers.grip.locked for each in setting.assignments}
-    written = []
-    for rank, proposal in enumerate(proposals, start=1):
-        place = writable_folder(folder / folder_name(rank, proposal.tried.name))
-        text = problem_file(plan, proposal.result.problem, locked[proposal.tried.name], "..")
-        write_text(text, place / "problem.yaml")
-        proposal.result.save(place / "result.npz")
-        written.append(replace(proposal, folder=place))
-        write_views(written[-1])
+    proposals = [
+        _written(plan, setting.assignments[i], Proposal(tried[i], result, folder / folder_name(i, tried[i].name)))
+        for i, result in results.items()
+    ]
+    proposals.sort(key=lambda each: -each.quality)
     seconds = time.perf_counter() - start
-    found = Proposals(tuple(written), quality, tried, setting.counts, end, seconds, setting.notes)
+    found = Proposals(tuple(proposals), quality, tried, setting.counts, end, seconds, setting.notes)
     found.save_table(folder / TABLE)
+    write_regions(setting.regions, folder / REGIONS)
     write_page(found, f"{setting.body.name} by {setting.hand}", folder / PAGE)
     return found
 
@@ -164,6 +162,17 @@ def _atlases(
                 return results, ProposalsEnd.INTERRUPTED
             bar.update()
     return results, ProposalsEnd.COMPLETE
+
+
+def _written(plan: Plan, assignment: Assignment, proposal: Proposal) -> Proposal:
+    """A proposal whose files are written; a problem file that is there already, and may be edited, stays."""
+    place = writable_folder(proposal.folder)
+    if not (place / PROBLEM).exists():
+        locked = assignment.fingers.grip.locked
+        write_text(problem_file(plan, proposal.result.problem, locked, ".."), place / PROBLEM)
+    proposal.result.save(place / RESULT)
+    write_views(proposal)
+    return proposal
 
 
 def _tried(assignment: Assignment, look: Look) -> Tried:

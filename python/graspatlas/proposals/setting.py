@@ -19,6 +19,7 @@ from graspatlas.proposals.assignments.symmetry import region_symmetries
 from graspatlas.proposals.files import write_text
 from graspatlas.proposals.object_files import write_object
 from graspatlas.regions.find import find_regions
+from graspatlas.regions.region import Region
 
 __all__ = ["Setting", "made_ready"]
 
@@ -31,6 +32,7 @@ class Setting:
         hand: Name of the hand.
         source: How a problem file names the hand: ``{"urdf": path}`` and so on.
         body: The object.
+        regions: Its regions, the largest first.
         assignments: The assignments, the most promising first.
         counts: How many there were, and why some were left out.
         notes: What a user should know of hand and object, one sentence each.
@@ -39,6 +41,7 @@ class Setting:
     hand: str
     source: dict[str, str]
     body: Body
+    regions: tuple[Region, ...]
     assignments: list[Assignment]
     counts: Counts
     notes: tuple[str, ...]
@@ -88,4 +91,4 @@ def made_ready(
             f"no posture of hand '{hand.name}' could hold '{mesh.name}' by its fingertips ({counts}): look whether its "
             "size fits the hand, or name other links, such as the palm"
         )
-    return Setting(hand.name, dict(named.source), body, assignments, counts, tuple(notes))
+    return Setting(hand.name, dict(named.source), body, tuple(regions), assignments, counts, tuple(notes))

@@ -79,7 +79,7 @@ def problem_of(plan: Plan, assignment: Assignment) -> Problem:
         contacts.append(Contact(pad.frame, touched(pad), patch))
     stated = tuple(each for each in plan.requirements if isinstance(each, StatedRequirement))
     return Problem(
-        name=assignment.name,
+        name=f"{plan.body.name} by {plan.hand}",
         hand=assignment.fingers.hand,
         object=plan.body,
         contacts=tuple(contacts),
