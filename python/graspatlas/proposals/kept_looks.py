@@ -35,7 +35,7 @@ class KeptLooks:
         stated = [
             VERSION,
             dict(plan.source),
-            plan.body.to_dict(),
+            plan.surface,
             quality_name(plan.quality),
             [requirement_name(requirement) for requirement in plan.requirements],
             plan.length_scale,

@@ -21,6 +21,7 @@ class Plan(Light):
         hand: Name of the hand.
         source: How a problem file names the hand: ``{"urdf": path}`` and so on.
         body: The object.
+        surface: SHA-256 of its surface.
         quality: The index that ranks proposals.
         requirements: What grasps must meet.
         radius: r, of the charts of the atlases.
@@ -31,6 +32,7 @@ class Plan(Light):
     hand: str
     source: Mapping[str, str]
     body: Body
+    surface: str
     quality: Quality
     requirements: tuple[RequirementLike, ...]
     radius: float = 0.3

@@ -109,7 +109,7 @@ def propose(
         need("looking at assignments on workers", "dask.distributed")
     folder = writable_folder(output)
     setting = made_ready(named_hand(os.fspath(hand)), Path(mesh), scale, folder, fingers, links, seed)
-    plan = Plan(setting.hand, setting.source, setting.body, quality, tuple(require), seed=seed)
+    plan = Plan(setting.hand, setting.source, setting.body, setting.surface, quality, tuple(require), seed=seed)
     kept = KeptLooks(folder / "looks", plan, setting.assignments)
     until = max(deadline - top * (GROWING + VIEWING), start + LOOKING * (max_seconds or 0.0))
     with progress_bar("assignments", total=len(setting.assignments), progress=progress) as bar:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +23,9 @@ from graspatlas.proposals.object_files import write_object
 from graspatlas.regions.find import find_regions
 from graspatlas.regions.region import Region
 
+if TYPE_CHECKING:
+    import trimesh
+
 __all__ = ["Setting", "made_ready"]
 
 
@@ -32,6 +37,7 @@ class Setting:
         hand: Name of the hand.
         source: How a problem file names the hand: ``{"urdf": path}`` and so on.
         body: The object.
+        surface: SHA-256 of its repaired surface.
         regions: Its regions, the largest first.
         assignments: The assignments, the most promising first.
         counts: How many there were, and why some were left out.
@@ -41,6 +47,7 @@ class Setting:
     hand: str
     source: dict[str, str]
     body: Body
+    surface: str
     regions: tuple[Region, ...]
     assignments: list[Assignment]
     counts: Counts
@@ -91,4 +98,12 @@ def made_ready(
             f"no posture of hand '{hand.name}' could hold '{mesh.name}' by its fingertips ({counts}): look whether its "
             "size fits the hand, or name other links, such as the palm"
         )
-    return Setting(hand.name, dict(named.source), body, tuple(regions), assignments, counts, tuple(notes))
+    return Setting(
+        hand.name, dict(named.source), body, _digest(fixed), tuple(regions), assignments, counts, tuple(notes)
+    )
+
+
+def _digest(mesh: trimesh.Trimesh) -> str:
+    """SHA-256 of the vertices and faces of a mesh."""
+    arrays = np.asarray(mesh.vertices, "<f8"), np.asarray(mesh.faces, "<i8")
+    return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
