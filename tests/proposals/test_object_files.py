@@ -33,6 +33,7 @@ def test_a_convex_mesh_stays_one_piece_with_the_mass_of_water(tmp_path: Path) ->
     assert f'mass value="{DENSITY * 0.04 * 0.06 * 0.1:.6g}"' in text
 
 
+@pytest.mark.slow
 def test_a_mug_is_cut_into_convex_pieces_that_leave_its_inside_free(tmp_path: Path) -> None:
     pytest.importorskip("coacd")
     mesh = mug()
@@ -56,7 +57,8 @@ def test_without_the_library_it_says_so(tmp_path: Path, monkeypatch: pytest.Monk
     assert "pip install 'graspatlas[mesh]'" in note
 
 
-def test_an_open_surface_has_the_mass_of_its_hull(tmp_path: Path) -> None:
+def test_an_open_surface_has_the_mass_of_its_hull(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "coacd", None)  # whose cut takes seconds
     sheet = trimesh.creation.box((0.04, 0.06, 0.1))
     sheet.update_faces(np.arange(len(sheet.faces)) > 1)
     write_object(sheet, "sheet", tmp_path)
