@@ -50,7 +50,7 @@ def test_no_other_climb_round_the_can_is_better() -> None:
     problem = ga.load_problem("schunk_can")
     climbs = RandomClimbs(problem, "manipulability_volume", problem.requirements)
     best = best_value(problem)
-    found = values(climbs, range(12), draws=12)
+    found = values(climbs, range(24), draws=12)
     assert len(found) > 8
     assert found.max() <= (1.0 + SHARE) * best
     assert found.max() > 0.8 * best  # else this would be no match
