@@ -1,13 +1,19 @@
-"""What tasks on workers are made of, pickled once, with functions of the user, for the same version of the package."""
+"""What tasks on workers are made of: pickled once, and opened once by a worker of the same version of the package."""
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.version import __version__
 
-__all__ = ["check_version", "sealed"]
+__all__ = ["opened", "sealed"]
+
+#: What a worker keeps open, with what it has read and computed for it.
+KEPT = 2
 
 
 def sealed(whole: object, functions: Mapping[str, object], instead: str) -> bytes:
@@ -34,16 +40,23 @@ def sealed(whole: object, functions: Mapping[str, object], instead: str) -> byte
     return bytes(cloudpickle.dumps(whole))
 
 
-def check_version(version: str) -> None:
-    """Make sure, on a worker, that the process that submits has its version of the package.
+def opened(version: str, whole: bytes) -> Any:
+    """What was sealed, the same object at every call: to read a hand and its meshes takes long.
 
     Args:
-        version: That of the process that submits.
+        version: That of the process that sealed it.
+        whole: It, sealed.
 
     Raises:
-        GraspAtlasError: If they differ.
+        GraspAtlasError: If this process, a worker, has another version.
     """
     if version != __version__:
         raise GraspAtlasError(
             f"a worker has graspatlas {__version__} and this process {version}: install the same version on both"
         )
+    return _unpickled(whole)
+
+
+@lru_cache(maxsize=KEPT)
+def _unpickled(whole: bytes) -> Any:
+    return pickle.loads(whole)

@@ -63,13 +63,17 @@ def _propose(options: argparse.Namespace) -> int:
 
 def _lines(found: Proposals) -> list[str]:
     """What is said of proposals."""
+    from graspatlas.proposals.outcome import ProposalsEnd
+
     lines = [*found.notes, str(found.counts), found.summary()]
     for proposal in found.proposals:
         lines.append(f"  {proposal.quality:10.5g}  {proposal.tried.name}  ({proposal.folder.name})")
     left = found.counts.left - len(found.tried)
     if left:
         lines.append(f"{left} assignments are left: start it again with the same arguments to look at more of them")
-    if not found.proposals:
+    if found.status is ProposalsEnd.INTERRUPTED:
+        lines.append("interrupted: start it again with the same arguments to go on; what was done is kept")
+    elif not found.proposals:
         lines.append("no grasp was found that meets the requirements:")
         lines += [f"  {count:5} assignments: {reason}" for reason, count in found.refusals().items()]
         lines.append("try another --seed, more --max-seconds, other --fingers or --links, or softer requirements")

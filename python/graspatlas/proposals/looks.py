@@ -2,34 +2,24 @@
 
 from __future__ import annotations
 
-import pickle
 import time
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
-from functools import lru_cache, partial
 from typing import TypeAlias
 
-from graspatlas.cluster.client import connected
-from graspatlas.cluster.numbered_tasks import NumberedTasks
-from graspatlas.cluster.sealing import check_version, sealed
+from graspatlas.cluster.sealing import sealed
+from graspatlas.cluster.workers import Workers
 from graspatlas.proposals.assignments.matching import Assignment
 from graspatlas.proposals.kept_looks import KeptLooks
 from graspatlas.proposals.outcome import ProposalsEnd
 from graspatlas.proposals.plan import Plan
 from graspatlas.proposals.trial import Look, LookEnd, look_at
-from graspatlas.quality.batched import quality_name
-from graspatlas.requirements.base import requirement_name
-from graspatlas.support.machine import available_threads
+from graspatlas.requirements.base import users_functions
 from graspatlas.support.progress import ProgressBar
-from graspatlas.version import __version__
 
 __all__ = ["Looker", "OnWorkers", "here", "looks_at"]
 
 #: Where looks are done: those of some numbers, in their order, as long as they come before a deadline.
 Looker: TypeAlias = Callable[[Plan, Sequence[Assignment], Sequence[int], float], Generator[Look, None, None]]
-
-#: Plans that a worker keeps, with what it has read for them.
-KEPT_PLANS = 2
 
 
 def looks_at(
@@ -87,40 +77,20 @@ def here(
         yield look_at(plan, assignments[number])
 
 
-@dataclass(frozen=True)
-class OnWorkers:
-    """Looks on workers; a :data:`Looker`.
-
-    Attributes:
-        workers: Processes on this machine, all cores by default; they end with the search.
-        scheduler: Address of a scheduler whose workers are used instead.
-    """
-
-    workers: int | None = None
-    scheduler: str | None = None
+class OnWorkers(Workers):
+    """Looks on workers; a :data:`Looker`."""
 
     def __call__(
         self, plan: Plan, assignments: Sequence[Assignment], numbers: Sequence[int], deadline: float
     ) -> Generator[Look, None, None]:
         """The looks of some numbers; see :data:`Looker`."""
-        if not numbers:
-            return
-        functions: dict[str, object] = {f"the index {quality_name(plan.quality)}": plan.quality}
-        functions.update({f"the requirement {requirement_name(each)}": each for each in plan.requirements})
-        whole = sealed((plan, tuple(assignments)), functions, "propose without workers")
-        with connected(self.scheduler, self.workers or available_threads()) as client:
-            tasks: NumberedTasks[Look] = NumberedTasks(client, partial(_on_worker, __version__, whole), "assignment")
-            yield from tasks.results(numbers, deadline)
+        if numbers:
+            functions = users_functions(plan.quality, plan.requirements)
+            whole = sealed((plan, tuple(assignments)), functions, "propose without workers")
+            yield from self.results(_look, whole, "assignment", numbers, deadline)
 
 
-def _on_worker(version: str, whole: bytes, number: int, max_seconds: float | None) -> Look:
-    check_version(version)
-    plan, assignments = _opened(whole)
+def _look(whole: tuple[Plan, tuple[Assignment, ...]], number: int, max_seconds: float | None) -> Look:
+    """A look on a worker, which takes a second or two, whatever is left."""
+    plan, assignments = whole
     return look_at(plan, assignments[number])
-
-
-@lru_cache(maxsize=KEPT_PLANS)
-def _opened(whole: bytes) -> tuple[Plan, tuple[Assignment, ...]]:
-    """Plan and assignments, which are read once: to read a hand and its meshes takes long."""
-    opened: tuple[Plan, tuple[Assignment, ...]] = pickle.loads(whole)
-    return opened

@@ -7,13 +7,13 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from graspatlas.cluster.client import need
+from graspatlas.cluster.workers import check_workers
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.named_hands import named_hand
 from graspatlas.proposals.assignments.matching import Assignment
 from graspatlas.proposals.files import folder_name, problem_file, write_text
 from graspatlas.proposals.kept_looks import KeptLooks
-from graspatlas.proposals.looks import OnWorkers, here, looks_at
+from graspatlas.proposals.looks import Looker, OnWorkers, here, looks_at
 from graspatlas.proposals.outcome import Proposal, Proposals, ProposalsEnd, Tried
 from graspatlas.proposals.page import REGIONS, write_page, write_regions, write_views
 from graspatlas.proposals.plan import Plan
@@ -104,9 +104,11 @@ def propose(
     whole(top, "top")
     find_index(quality)
     check_requirements(require)
-    looker = here if workers is None and scheduler is None else OnWorkers(workers, scheduler)
-    if looker is not here:
-        need("looking at assignments on workers", "dask.distributed")
+    whole(seed, "seed", 0)
+    looker: Looker = here
+    if workers is not None or scheduler is not None:
+        check_workers("looking at assignments on workers", workers, scheduler)
+        looker = OnWorkers(workers, scheduler)
     folder = writable_folder(output)
     setting = made_ready(named_hand(os.fspath(hand)), Path(mesh), scale, folder, fingers, links, seed)
     plan = Plan(setting.hand, setting.source, setting.body, setting.surface, quality, tuple(require), seed=seed)
