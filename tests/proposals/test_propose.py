@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import shutil
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from proposals.conftest import HAND, LINKS
 import graspatlas as ga
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.proposals.outcome import COLUMNS
+from graspatlas.proposals.propose import _schedule
 from graspatlas.proposals.trial import LookEnd
 from graspatlas.requirements.base import asked
 
@@ -115,6 +117,30 @@ def test_requirements_that_nothing_meets_are_named(can_file: Path, tmp_path: Pat
     assert found.refusals()
     assert all("holding_force" in reason or "no grasp was found" in reason for reason in found.refusals())
     assert all(each.end is not LookEnd.MET for each in found.tried)
+
+
+def test_an_atlas_that_cannot_grow_is_said(
+    output: Path, proposed: ga.Proposals, can_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object) -> None:
+        raise ga.GraspAtlasError("it is singular there")
+
+    monkeypatch.setattr(import_module("graspatlas.proposals.propose"), "atlas_of", fails)
+    shutil.copytree(output / "looks", tmp_path / "looks")
+    found = ga.propose(HAND, can_file, tmp_path, links=LINKS, top=2, max_seconds=None)
+    assert not found.proposals
+    assert sum("it is singular there" in note for note in found.notes) == len(proposed.proposals)
+
+
+@pytest.mark.parametrize(("seconds", "top"), [(90.0, 5), (20.0, 5), (3.0, 1), (600.0, 20)])
+def test_there_is_time_for_each_part(seconds: float, top: int) -> None:
+    looked, grown = _schedule(0.0, seconds, top)
+    assert 0.5 * seconds <= looked < grown < seconds
+    assert grown - looked > seconds - grown, "atlases take longer than pictures"
+
+
+def test_without_a_limit_there_is_none() -> None:
+    assert _schedule(0.0, float("inf"), 5) == (float("inf"), float("inf"))
 
 
 @pytest.mark.slow

@@ -113,13 +113,14 @@ def propose(
     setting = made_ready(named_hand(os.fspath(hand)), Path(mesh), scale, folder, fingers, links, seed)
     plan = Plan(setting.hand, setting.source, setting.body, setting.surface, quality, tuple(require), seed=seed)
     kept = KeptLooks(folder / "looks", plan, setting.assignments)
-    until = max(deadline - top * (GROWING + VIEWING), start + LOOKING * (max_seconds or 0.0))
+    looked, grown = _schedule(start, deadline, top)
     with progress_bar("assignments", total=len(setting.assignments), progress=progress) as bar:
-        looks, end = looks_at(plan, setting.assignments, kept, looker, until, deadline, bar)
+        looks, end = looks_at(plan, setting.assignments, kept, looker, looked, deadline, bar)
     tried = tuple(_tried(each, look) for each, look in zip(setting.assignments, looks, strict=False))
     results: dict[int, Result] = {}
+    faults: list[str] = []
     if end is not ProposalsEnd.INTERRUPTED:
-        results, atlases_end = _atlases(plan, setting.assignments, looks, top, deadline - top * VIEWING, progress)
+        results, faults, atlases_end = _atlases(plan, setting.assignments, looks, top, grown, progress)
         end = end if atlases_end is ProposalsEnd.COMPLETE else atlases_end
     proposals = [
         _written(plan, setting.assignments[i], Proposal(tried[i], result, folder / folder_name(i, tried[i].name)))
@@ -127,11 +128,20 @@ def propose(
     ]
     proposals.sort(key=lambda each: -each.quality)
     seconds = time.perf_counter() - start
-    found = Proposals(tuple(proposals), quality, tried, setting.counts, end, seconds, setting.notes)
+    notes = (*setting.notes, *faults)
+    found = Proposals(tuple(proposals), quality, tried, setting.counts, end, seconds, notes)
     found.save_table(folder / TABLE)
     write_regions(setting.regions, folder / REGIONS)
     write_page(found, f"{setting.body.name} by {setting.hand}", folder / PAGE)
     return found
+
+
+def _schedule(start: float, deadline: float, top: int) -> tuple[float, float]:
+    """When looks are to end, and atlases, so that there is time for what comes after them."""
+    if deadline == float("inf"):
+        return deadline, deadline
+    looked = max(deadline - top * (GROWING + VIEWING), start + LOOKING * (deadline - start))
+    return looked, looked + GROWING / (GROWING + VIEWING) * (deadline - looked)
 
 
 def _atlases(
@@ -141,29 +151,30 @@ def _atlases(
     top: int,
     deadline: float,
     progress: bool | None,
-) -> tuple[dict[int, Result], ProposalsEnd]:
-    """The atlases of the assignments with the best looks, by number, and why they ended."""
+) -> tuple[dict[int, Result], list[str], ProposalsEnd]:
+    """The atlases of the assignments with the best looks, by number; what went wrong; and why they ended."""
     met = [i for i, look in enumerate(looks) if look.end is LookEnd.MET]
     best = sorted(met, key=lambda i: -looks[i].value)[:top]
     results: dict[int, Result] = {}
+    faults: list[str] = []
     with progress_bar("atlases", total=len(best), progress=progress) as bar:
         for done, i in enumerate(best):
             if results and time.perf_counter() > deadline:
-                return results, ProposalsEnd.TIME_LIMIT
+                return results, faults, ProposalsEnd.TIME_LIMIT
             left = seconds_until(deadline, SHORTEST)
             seconds = None if left is None else max(left / (len(best) - done), SHORTEST)
             try:
                 result = atlas_of(plan, assignments[i], looks[i], seconds)
                 if result.accepted.any() or result.refinement:
                     results[i] = result
-            except GraspAtlasError:
-                pass  # singular where charts would be; its look stays in the table
+            except GraspAtlasError as error:  # singular where charts would be
+                faults.append(f"no atlas of {assignments[i].name}: {error}")
             except KeyboardInterrupt:
-                return results, ProposalsEnd.INTERRUPTED
+                return results, faults, ProposalsEnd.INTERRUPTED
             if stopping():
-                return results, ProposalsEnd.INTERRUPTED
+                return results, faults, ProposalsEnd.INTERRUPTED
             bar.update()
-    return results, ProposalsEnd.COMPLETE
+    return results, faults, ProposalsEnd.COMPLETE
 
 
 def _written(plan: Plan, assignment: Assignment, proposal: Proposal) -> Proposal:
