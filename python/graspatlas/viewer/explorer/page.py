@@ -93,7 +93,7 @@ def explorer_page(result: GraspAtlas, chart: int | None = None) -> str:
 
 def _extremes(result: GraspAtlas) -> str:
     """Values of the best and the worst grasp, in words."""
-    grasps = [("best", result.refined_best)] if result.refinement else []
+    grasps = [("refined best", result.refined_best)] if result.refinement else []
     if result.accepted.any():
         grasps += [] if grasps else [("best", result.best)]
         grasps.append(("worst", result.worst))
