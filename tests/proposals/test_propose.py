@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import shutil
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
@@ -91,6 +92,21 @@ def test_looks_are_not_done_twice_and_edits_stay(
     assert [each.value for each in found.tried] == [each.value for each in proposed.tried]
     assert len(found.proposals) == 1
     assert edited.read_text().endswith("# mine\n")
+
+
+def test_two_functions_of_one_name_are_two(can_file: Path, tmp_path: Path) -> None:
+    def made(base: float) -> Callable[[ga.Grasp], float]:
+        def height(grasp: ga.Grasp) -> float:
+            return base + float(grasp.object_xyz[2])
+
+        return height
+
+    low, high = (
+        ga.propose(HAND, can_file, tmp_path, links=LINKS, top=1, quality=made(base), max_seconds=None)
+        for base in (1.0, 5.0)
+    )
+    assert low.proposals[0].quality < 2.0
+    assert high.proposals[0].tried.value > 4.0
 
 
 def test_a_folder_of_other_arguments_is_refused(can_file: Path, output: Path, proposed: ga.Proposals) -> None:
