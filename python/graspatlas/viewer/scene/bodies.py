@@ -24,7 +24,7 @@ __all__ = ["BodyMeshes", "BodyShapes"]
 #: Red, green, blue and opacity of obstacles.
 OBSTACLE = (0.36, 0.50, 0.62, 0.30)
 #: Side of the plates that stand for planes, as a multiple of the object's diagonal; their thickness as a share of that.
-PLATE, THIN = 3.0, 0.01
+PLATE, THIN = 1.2, 0.01
 
 
 @dataclass(frozen=True, eq=False)
