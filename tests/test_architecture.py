@@ -27,6 +27,7 @@ FLOORS = (
         "patches",
         "regions",
         "hand",
+        "world",
         "problem",
         "collision",
         "pads",

@@ -27,14 +27,16 @@ using ShapeTuple = std::tuple<std::string, std::string, Eigen::Vector3d, DoubleA
 
 constexpr py::ssize_t kRowsForThreads = 64;  // fewer grasps are done before other threads have started
 
-const std::pair<const char*, ShapeKind> kKinds[] = {{"sphere", ShapeKind::sphere},     {"capsule", ShapeKind::capsule},
-                                                    {"cylinder", ShapeKind::cylinder}, {"box", ShapeKind::box},
-                                                    {"convex", ShapeKind::convex},     {"mesh", ShapeKind::mesh}};
+const std::pair<const char*, ShapeKind> kKinds[] = {
+    {"sphere", ShapeKind::sphere},        {"capsule", ShapeKind::capsule},
+    {"cylinder", ShapeKind::cylinder},    {"box", ShapeKind::box},
+    {"convex", ShapeKind::convex},        {"mesh", ShapeKind::mesh},
+    {"half_space", ShapeKind::half_space}};
 
 ShapeKind kind_from(const std::string& name) {
   for (const auto& [text, kind] : kKinds)
     if (name == text) return kind;
-  throw Error("a collision shape is a sphere, capsule, cylinder, box, convex or mesh, not '" + name + "'");
+  throw Error("a collision shape is a sphere, capsule, cylinder, box, convex, mesh or half_space, not '" + name + "'");
 }
 
 std::string name_of(ShapeKind kind) {

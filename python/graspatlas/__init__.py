@@ -89,6 +89,8 @@ if typing.TYPE_CHECKING:
         plot_planar_grasp,
         plot_planar_indices,
     )
+    from graspatlas.world.obstacle import Obstacle
+    from graspatlas.world.pose import Pose
 
 __all__ = [
     "Approach",
@@ -112,9 +114,11 @@ __all__ = [
     "HoldingForce",
     "JointMargin",
     "Ladder",
+    "Obstacle",
     "Pad",
     "Path",
     "Peak",
+    "Pose",
     "PoseGuess",
     "Pregrasp",
     "Problem",
@@ -248,6 +252,8 @@ _HOMES: dict[str, tuple[str, ...]] = {
         "plot_planar_grasp",
         "plot_planar_indices",
     ),
+    "world.obstacle": ("Obstacle",),
+    "world.pose": ("Pose",),
 }
 _MODULE_OF = {name: module for module, names in _HOMES.items() for name in names}
 #: Imported with a module: problems state requirements by the names under which these enter themselves.

@@ -81,6 +81,7 @@ def with_fixed_links(*frames: str) -> Any:
         object=ga.Body.sphere("ball", 0.02),
         contacts=[SimpleNamespace(frame=frame) for frame in frames],
         object_joint_model=FREE_FLYER,
+        obstacles=(),
     )
 
 

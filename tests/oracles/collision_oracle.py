@@ -95,6 +95,7 @@ def made_problem(folder: Any, hand_kinds: str, object_kinds: str, tip: str = "s"
         object=ga.Body("thing", body + "</robot>"),
         contacts=[SimpleNamespace(frame="a2")],
         object_joint_model=FREE_FLYER,
+        obstacles=(),
     )
 
 

@@ -19,8 +19,9 @@ PAGE = (ROOT / "docs" / "problem_files.md").read_text(encoding="utf-8")
 
 
 def test_the_example_of_the_documentation_holds():
-    (text,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+    text, obstacles = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
     problem = read_problem(text, "example.yaml")
+    assert len(read_problem(text + obstacles, "example.yaml").obstacles) == 3
     result = ga.optimize(problem)
     assert result.is_global
     assert 100 < result.accepted.sum() < len(result.accepted)

@@ -19,7 +19,7 @@ from graspatlas.viewer import save_picture
 from graspatlas.viewer.scene import bodies, meshes
 from graspatlas.viewer.scene import stick_figure as sketch
 from graspatlas.viewer.scene import velocity_ellipsoid as ellipsoid
-from graspatlas.viewer.scene.scene import CONTACT_RADIUS, Scene
+from graspatlas.viewer.scene.scene import CONTACT_RADIUS, Scene, grasp_parts
 
 Array = NDArray[np.float64]
 
@@ -166,3 +166,21 @@ def test_grasps_stand_apart_and_inside_the_window(result: ga.Result) -> None:
     assert (seen >= [window[0] - 1e-6, window[2] - 1e-6]).all()
     assert (seen <= [window[1] + 1e-6, window[3] + 1e-6]).all()
     assert_allclose(camera.axes @ camera.axes.T, np.eye(3), atol=1e-12)
+
+
+def test_obstacles_are_drawn_where_they_are_and_see_through(small_result: ga.Result) -> None:
+    box = ga.Obstacle.box("wall", [0.1, 0.2, 0.3], ga.Pose([0.0, 0.3, 0.0], [0.0, 0.0, 1.0, 1.0]))
+    table = ga.Obstacle.plane("table", [0.0, 0.0, -0.1])
+    camera = ga.Obstacle.sphere("camera", 0.05, ga.Pose([0.0, 0.0, 0.2]), frame="palm")
+    result = replace(small_result, problem=replace(small_result.problem, obstacles=(box, table, camera)))
+    grasp = result.best
+    parts = [part for part in grasp_parts(bodies.BodyShapes(result.problem), grasp)[0] if part.group == "obstacle"]
+    assert len(parts) == 3
+    assert all(0.0 < part.colour[3] < 0.6 for part in parts)
+    wall, plate, ball = (part.mesh.moved(part.T).vertices for part in parts)
+    assert_allclose(wall.mean(axis=0), (grasp.T_palm_object @ [0.0, 0.3, 0.0, 1.0])[:3], atol=1e-9)
+    up = grasp.T_palm_object[:3, 2]
+    assert (plate @ up).max() == pytest.approx(grasp.object_xyz @ up - 0.1)
+    assert_allclose((ball.min(axis=0) + ball.max(axis=0)) / 2.0, [0.0, 0.0, 0.2], atol=1e-3)
+    bare, shown = Scene(small_result), Scene(result)
+    assert_allclose(shown.camera(1.5, (-0.9, 0.9, -0.5, 0.8)).target, bare.camera(1.5, (-0.9, 0.9, -0.5, 0.8)).target)

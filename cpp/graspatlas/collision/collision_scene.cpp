@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "graspatlas/collision/support_point.hpp"
 #include "graspatlas/errors.hpp"
 #include "graspatlas/parallel.hpp"
 
@@ -54,7 +55,7 @@ std::shared_ptr<coal::CollisionGeometry> geometry_of(const CollisionShape& shape
   const std::string what = "collision shape '" + shape.name + "' ";
   const Vector3& s = shape.sizes;
   const int sizes = shape.kind == ShapeKind::sphere ? 1 : shape.kind == ShapeKind::box ? 3 : 2;
-  const bool solid = shape.kind == ShapeKind::convex || shape.kind == ShapeKind::mesh;
+  const bool solid = shape.kind >= ShapeKind::convex;
   if (!solid && !(s.head(sizes).allFinite() && s.head(sizes).minCoeff() >= 0.0))
     throw Error(what + "must have finite sizes, none negative");
   for (const Vector3& point : shape.points)
@@ -74,6 +75,8 @@ std::shared_ptr<coal::CollisionGeometry> geometry_of(const CollisionShape& shape
       } catch (const std::exception& error) {
         throw Error(what + "of " + std::to_string(shape.points.size()) + " points has no convex hull: " + error.what());
       }
+    case ShapeKind::half_space:
+      return std::make_shared<coal::Halfspace>(Vector3::UnitZ(), 0.0);
     default:
       return triangle_mesh(shape);
   }
@@ -98,6 +101,7 @@ coal::Transform3s transform_of(const Placement& placement) { return {placement.r
 
 struct CollisionScene::Geometries {
   std::vector<std::shared_ptr<coal::CollisionGeometry>> shapes;
+  std::vector<CollisionShape> stated;  ///< empty without half-spaces, which alone are measured from them
 };
 
 CollisionScene::CollisionScene(const Model& model, const std::vector<CollisionShape>& shapes,
@@ -109,17 +113,25 @@ CollisionScene::CollisionScene(const Model& model, const std::vector<CollisionSh
       throw Error("collision shape '" + shape.name + "' sits on joint " + std::to_string(shape.joint) +
                   ", but there are " + std::to_string(model_.joint_count()));
     geometries->shapes.push_back(geometry_of(shape));
+    if (shape.kind == ShapeKind::half_space) {
+      carriers_.push_back({shape.joint, false, true, shape.placement, Vector3::Zero(), Vector3::Zero(), 0.0});
+      geometries->stated = shapes;
+      continue;
+    }
     coal::CollisionGeometry& geometry = *geometries->shapes.back();
     geometry.computeLocalAABB();
     const Vector3 center = geometry.aabb_local.center();
     const Vector3 half = 0.5 * (geometry.aabb_local.max_ - geometry.aabb_local.min_);
-    carriers_.push_back(
-        {shape.joint, shape.kind == ShapeKind::mesh, shape.placement, center, half, ball_radius(shape, center, half)});
+    carriers_.push_back({shape.joint, shape.kind == ShapeKind::mesh, false, shape.placement, center, half,
+                         ball_radius(shape, center, half)});
   }
   for (const CollisionPair& pair : pairs_)
     if (std::min(pair.first, pair.second) < 0 || std::max(pair.first, pair.second) >= shape_count() ||
         pair.first == pair.second || !std::isfinite(pair.required))
       throw Error("a collision pair names two shapes of " + std::to_string(shape_count()) + " and a distance");
+  for (const CollisionPair& pair : pairs_)
+    if (carriers_[pair.first].half_space && carriers_[pair.second].half_space)
+      throw Error("two half-spaces have no distance");
   geometries_ = std::move(geometries);
 }
 
@@ -166,6 +178,7 @@ void CollisionSpace::place(const double* q) {
 
 /// True when balls or boxes show that a pair keeps its distance. Only that is told: false says nothing.
 bool CollisionSpace::apart(const CollisionPair& pair) const {
+  if (with_half_space(pair)) return ball_above_half_space(pair);
   const auto &first = scene_->carriers_[pair.first], &second = scene_->carriers_[pair.second];
   const Vector3 between = centers_[pair.second] - centers_[pair.first];
   const double gap = pair.required + kDoubt, reach = first.radius + second.radius + gap;
@@ -188,6 +201,33 @@ bool CollisionSpace::apart(const CollisionPair& pair) const {
   return false;
 }
 
+bool CollisionSpace::with_half_space(const CollisionPair& pair) const {
+  return scene_->carriers_[pair.first].half_space || scene_->carriers_[pair.second].half_space;
+}
+
+/// Whether the ball about the shape of a pair with a half-space keeps its distance.
+bool CollisionSpace::ball_above_half_space(const CollisionPair& pair) const {
+  const bool first = scene_->carriers_[pair.first].half_space;
+  const Placement& plane = placements_[first ? pair.first : pair.second];
+  const int shape = first ? pair.second : pair.first;
+  const double height = plane.rotation.col(2).dot(centers_[shape] - plane.translation);
+  return height - scene_->carriers_[shape].radius > pair.required + kDoubt;
+}
+
+/// The lowest point of the shape of a pair with a half-space, and the point of the plane below it.
+NearestPoints CollisionSpace::nearest_to_half_space(const CollisionPair& pair) const {
+  const bool first = scene_->carriers_[pair.first].half_space;
+  const Placement& plane = placements_[first ? pair.first : pair.second];
+  const int shape = first ? pair.second : pair.first;
+  const Placement& at = placements_[shape];
+  const Vector3 up = plane.rotation.col(2);
+  const Vector3 lowest = at.translation + at.rotation * support_point(scene_->geometries_->stated[shape],
+                                                                      Vector3(-(at.rotation.transpose() * up)));
+  const double height = up.dot(lowest - plane.translation);
+  const Vector3 below = lowest - height * up;
+  return first ? NearestPoints{height, below, lowest, up} : NearestPoints{height, lowest, below, -up};
+}
+
 /// Lets coal begin with the line between the centres, in the frame of the first shape.
 void CollisionSpace::aim(int pair) {
   const CollisionPair& p = scene_->pairs_[pair];
@@ -203,6 +243,7 @@ void CollisionSpace::aim(int pair) {
 bool CollisionSpace::hit(int pair) {
   const CollisionPair& p = scene_->pairs_[pair];
   if (apart(p)) return false;
+  if (with_half_space(p)) return nearest_to_half_space(p).distance <= p.required;
   auto& compute = solvers_->collision[pair];
   if (!compute) {
     const auto& shapes = scene_->geometries_->shapes;
@@ -232,6 +273,7 @@ int CollisionSpace::first_hit() {
 
 NearestPoints CollisionSpace::nearest(int pair) {
   const CollisionPair& p = scene_->pairs_[pair];
+  if (with_half_space(p)) return nearest_to_half_space(p);
   auto& compute = solvers_->distance[pair];
   if (!compute) {
     const auto& shapes = scene_->geometries_->shapes;

@@ -17,7 +17,7 @@ struct CollisionPair {
 
 /// Where two shapes are nearest, or deepest in each other. Where two meshes cut each other points and normal are NaN.
 struct NearestPoints {
-  double distance;                      ///< [m]; negative in collision, but for meshes
+  double distance;                      ///< [m]; negative in collision, but for two meshes
   Eigen::Vector3d on_first, on_second;  ///< in the palm's frame [m]
   Eigen::Vector3d normal;               ///< unit vector from the first shape to the second, of growing distance
 };
@@ -42,10 +42,10 @@ class CollisionScene {
   friend class CollisionSpace;
   struct Geometries;
 
-  /// A shape's box and ball, which are quick to compare.
+  /// A shape's box and ball, which are quick to compare. A half-space has none.
   struct Carrier {
     int joint;
-    bool mesh;
+    bool mesh, half_space;
     Placement placement;
     Eigen::Vector3d box_center, box_half;  ///< in the shape's frame [m]
     double radius;                         ///< of the ball about the box's centre [m]
@@ -86,6 +86,9 @@ class CollisionSpace {
   struct Solvers;
 
   bool apart(const CollisionPair& pair) const;
+  bool with_half_space(const CollisionPair& pair) const;
+  bool ball_above_half_space(const CollisionPair& pair) const;
+  NearestPoints nearest_to_half_space(const CollisionPair& pair) const;
   void aim(int pair);
 
   std::shared_ptr<const CollisionScene> scene_;

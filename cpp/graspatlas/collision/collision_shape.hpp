@@ -9,8 +9,9 @@
 
 namespace graspatlas {
 
-/// What collides: a primitive about the origin with its axis along z, a convex solid, or the triangles of a mesh.
-enum class ShapeKind { sphere, capsule, cylinder, box, convex, mesh };
+/// What collides: a primitive about the origin with its axis along z, a convex solid, the triangles of a mesh, or all
+/// that lies at z <= 0.
+enum class ShapeKind { sphere, capsule, cylinder, box, convex, mesh, half_space };
 
 /// A collision shape and what carries it.
 struct CollisionShape {

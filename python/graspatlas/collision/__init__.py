@@ -1,4 +1,4 @@
-"""Collision shapes of hand and object, and their distances."""
+"""Collision shapes of hand, object and obstacles, and their distances."""
 
 from graspatlas.collision.checker import CollisionChecker, Nearest, collision_checker
 from graspatlas.collision.problem_shapes import CollisionShapes, collision_shapes

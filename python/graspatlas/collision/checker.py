@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = ["CollisionChecker", "Nearest", "collision_checker"]
 
-#: Before the names of the object's shapes.
-OBJECT = "object/"
+#: Before the names of the object's shapes, and of the obstacles'.
+OBJECT, OBSTACLE = "object/", "obstacle/"
 #: Grasps are checked in batches of this size, on all cores.
 BATCH = 2048
 
@@ -51,7 +51,7 @@ class Nearest:
 
 
 class CollisionChecker:
-    """Tells whether a grasp is free of collision: hand with itself, and hand with object.
+    """Tells whether a grasp is free of collision: hand with itself, with the object, and with the obstacles.
 
     Pairs of links that the hand's SRDF lists may touch. The links that carry a contact touch the object; they may sink
     into it by `touch_depth`, since a collision shape only approximates the surface. Other links keep `clearance`, those
@@ -61,10 +61,14 @@ class CollisionChecker:
     surfaces, and what touches them is made thinner by `touch_depth`. Hulls with more than some 250 corners are thinned,
     to 0.1 mm; `thinned` tells which.
 
+    All links keep `clearance` from obstacles, those that carry a contact too. Obstacles in the palm's frame are fixed
+    to the palm and to the links that do not move against it, so that these are not looked at; the object keeps
+    `clearance` from them. It may touch those in its own frame.
+
     Any number of threads may use one checker. Answers are functions of the grasp alone.
 
     Args:
-        problem: The problem; hand and object need collision shapes.
+        problem: The problem; hand, object and obstacles need collision shapes.
         touch_depth: Depth to which a touching link may sink into the object [m].
         clearance: Distance that all other pairs must keep [m].
 
@@ -75,7 +79,7 @@ class CollisionChecker:
         thinned: How far the hulls that were thinned reach beyond what is left of them, by the shapes' names [m].
 
     Raises:
-        GraspAtlasError: If hand or object has no collision shape, or a mesh or the SRDF cannot be read.
+        GraspAtlasError: If one of them has no collision shape, or a mesh or the SRDF cannot be read.
     """
 
     def __init__(self, problem: Problem, touch_depth: float = 0.002, clearance: float = 0.0) -> None:
@@ -92,7 +96,7 @@ class CollisionChecker:
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
-        """The shapes of hand and object, by whose names the pairs go."""
+        """The shapes of hand, object and obstacles, by whose names the pairs go."""
         return self._shapes
 
     def first_collision(self, x: ArrayLike) -> tuple[str, str] | None:
@@ -155,11 +159,7 @@ class CollisionChecker:
             convex, and infinite where there is no shape.
         """
         joint = None if frame is None else self._hand.frame(frame)[0]
-        chosen = [
-            i
-            for i, shape in enumerate(self._shapes)
-            if (_in_object(shape) if joint is None else not _in_object(shape) and shape.joint == joint)
-        ]
+        chosen = [i for i, shape in enumerate(self._shapes) if _carried(shape, joint)]
         rows, at = self._rows(np.asarray(x, float)[None]), np.atleast_2d(np.asarray(points, float))
         return np.asarray(self.batch.point_distances(rows, np.array(chosen, np.int32), at)[0])
 
@@ -198,7 +198,7 @@ class _Pair:
 def _joined(
     problem: Problem, object_joint: int, touch_depth: float, clearance: float
 ) -> tuple[list[Shape], list[_Pair]]:
-    """Shapes of hand and object, and the pairs to look at: those in the hand, then those with the object."""
+    """All shapes, and the pairs to look at: those in the hand, then those with the object, then with the obstacles."""
     stated = collision_shapes(problem)
     shapes = list(stated.hand)
     in_hand = list(enumerate(shapes))
@@ -214,6 +214,13 @@ def _joined(
             elif (stand_in := _may_touch(of_link, shape.is_mesh, touch_depth)) is not None:
                 pairs.append(_Pair(len(shapes), second, 0.0 if shape.is_mesh else -touch_depth))
                 shapes.append(stand_in)
+    of_object = [i for i, shape in enumerate(shapes) if _in_object(shape)]
+    for obstacle in stated.obstacles:
+        number, joint = len(shapes), object_joint if obstacle.on_object else 0
+        shapes.append(replace(obstacle.shape, name=OBSTACLE + obstacle.shape.name, joint=joint))
+        kept_off = [first for first, shape in in_hand if shape.joint != joint]
+        kept_off += [] if obstacle.on_object else of_object
+        pairs += [_Pair(first, number, clearance) for first in kept_off]
     return shapes, pairs
 
 
@@ -228,6 +235,13 @@ def _may_touch(shape: Shape, surface: bool, touch_depth: float) -> Shape | None:
             f"the collision mesh '{shape.name}' touches the object and is flat; give it some thickness"
         )
     return thinner(hull, touch_depth) if surface else hull
+
+
+def _carried(shape: Shape, joint: int | None) -> bool:
+    """Whether a shape is one of the hand's on a joint, or of the object's where there is none."""
+    if joint is None:
+        return _in_object(shape)
+    return not shape.name.startswith((OBJECT, OBSTACLE)) and shape.joint == joint
 
 
 def _in_object(shape: Shape) -> bool:

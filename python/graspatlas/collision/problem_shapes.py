@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
@@ -17,8 +18,17 @@ if TYPE_CHECKING:
     from graspatlas.hand.body import Body
     from graspatlas.hand.hand import Hand
     from graspatlas.problem.problem import Problem
+    from graspatlas.world.obstacle import Obstacle
 
-__all__ = ["CollisionShapes", "collision_shapes"]
+__all__ = ["CollisionShapes", "ObstacleShape", "collision_shapes"]
+
+
+@dataclass(frozen=True, eq=False)
+class ObstacleShape:
+    """A shape of an obstacle, and whether that is fixed to the object, or else to the palm."""
+
+    shape: Shape
+    on_object: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +40,7 @@ class CollisionShapes:
         object: Shapes of the object, placed in its own frame.
         ignored: Pairs of numbers of ``hand``, the smaller first, that may touch: shapes of one joint, links that the
             SRDF lists, and without an SRDF those of neighbouring joints.
+        obstacles: Shapes of the obstacles, placed in the object's frame or the palm's.
         touching_by_contact: Numbers of ``hand`` that touch the object at each contact (m,): the shapes of the link
             that it is stated on. A link without shapes, such as a mere frame, stands for the next one that it is fixed
             to and that has some; where there is none, for all that the same joint carries.
@@ -37,6 +48,7 @@ class CollisionShapes:
 
     hand: tuple[Shape, ...]
     object: tuple[Shape, ...]
+    obstacles: tuple[ObstacleShape, ...]
     ignored: frozenset[tuple[int, int]]
     touching_by_contact: tuple[frozenset[int], ...]
 
@@ -58,12 +70,25 @@ def collision_shapes(problem: Problem) -> CollisionShapes:
     :class:`graspatlas.collision.checker.CollisionChecker`.
 
     Raises:
-        GraspAtlasError: If hand or object has no collision shape, or a mesh or the SRDF cannot be read.
+        GraspAtlasError: If hand, object or an obstacle has no collision shape, or a mesh or the SRDF cannot be read.
     """
     hand = _shapes(problem.hand, problem.hand.tree)
     of_object = _shapes(problem.object, problem.object.urdf)
     touching = tuple(_touching(hand, problem, contact.frame) for contact in problem.contacts)
-    return CollisionShapes(hand, of_object, _ignored(hand, problem.hand), touching)
+    obstacles = tuple(shape for obstacle in problem.obstacles for shape in _obstacle_shapes(obstacle))
+    return CollisionShapes(hand, of_object, obstacles, _ignored(hand, problem.hand), touching)
+
+
+def _obstacle_shapes(obstacle: Obstacle) -> Iterator[ObstacleShape]:
+    """Shapes of an obstacle, each named after it."""
+    on_object, T = obstacle.frame == "object", obstacle.T_frame_shape
+    if obstacle.body is None:
+        yield ObstacleShape(Shape("half_space", name=obstacle.name, placement=T), on_object)
+        return
+    shapes = _shapes(obstacle.body, obstacle.body.urdf)
+    for i, shape in enumerate(shapes):
+        name = obstacle.name if len(shapes) == 1 else f"{obstacle.name}_{i}"
+        yield ObstacleShape(replace(shape, name=name, placement=T @ shape.placement), on_object)
 
 
 def _shapes(body: Body, tree: str) -> tuple[Shape, ...]:

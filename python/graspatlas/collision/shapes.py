@@ -33,7 +33,7 @@ class Shape:
 
     Attributes:
         kind: ``"sphere"``, ``"capsule"``, ``"cylinder"`` or ``"box"`` about the origin, with its axis along z;
-            ``"convex"`` or ``"mesh"``.
+            ``"convex"`` or ``"mesh"``; ``"half_space"`` is all that lies at z <= 0.
         sizes: Radius; radius and distance of the ends' centres; radius and length; edges [m].
         points: Corners of a convex solid or mesh (n, 3), metres.
         triangles: Corners of each triangle of a mesh (t, 3).

@@ -12,14 +12,12 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.hand import Hand
 from graspatlas.problem.contact_parameters import touching_parameters
 from graspatlas.problem.contacts import Contact
-from graspatlas.problem.object_joint import ObjectJoint, Quaternion
+from graspatlas.problem.object_joint import ObjectJoint
 from graspatlas.support.arrays import Array
-from graspatlas.support.validation import PlainTable, StatedTable, checked_table, number, number_array, numbers, shown
+from graspatlas.support.validation import PlainTable, StatedTable, checked_table, number, number_array, numbers
+from graspatlas.world.pose import LARGEST, unit_quaternion
 
-__all__ = ["FirstGrasp", "first_grasp_from_array", "first_grasp_to_array", "posture_array", "unit_quaternion"]
-
-#: Numbers of a first grasp are smaller [rad or m]: larger ones are mistakes, and their squares may overflow.
-LARGEST = 1e9
+__all__ = ["FirstGrasp", "first_grasp_from_array", "first_grasp_to_array", "posture_array"]
 
 
 @dataclass(frozen=True)
@@ -76,28 +74,6 @@ class FirstGrasp:
             object_quat_xyzw=numbers(table["object_quat_xyzw"], "object_quat_xyzw"),
             parameters=None if parameters is None else numbers(parameters, "parameters"),
         )
-
-
-def unit_quaternion(quaternion: Sequence[float], what: str) -> Quaternion:
-    """A quaternion (x, y, z, w) of length one.
-
-    Args:
-        quaternion: Of any other length.
-        what: What has it, for messages.
-
-    Raises:
-        GraspAtlasError: If it is not four finite numbers, or zero.
-    """
-    array = number_array(quaternion, f"the quaternion of {what}")
-    if array.shape != (4,) or not (np.abs(array) < LARGEST).all():
-        raise GraspAtlasError(f"{what} needs a quaternion of 4 finite numbers, got {shown(quaternion)}")
-    norm = float(np.linalg.norm(array))
-    if norm < 1e-6:
-        raise GraspAtlasError(f"{what} has a quaternion of length zero")
-    # One that is unit to rounding stays as it came, so that a stored problem is the same problem.
-    norm = 1.0 if abs(norm - 1.0) < 1e-12 else norm
-    x, y, z, w = (float(c) / norm for c in quaternion)
-    return (x, y, z, w)
 
 
 def posture_array(hand: Hand, joints: Mapping[str, float], what: str) -> Array:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from graspatlas.errors import GraspAtlasError
-from graspatlas.problem.first_grasp import LARGEST, unit_quaternion
 from graspatlas.problem.object_joint import PLANAR
 from graspatlas.support.validation import PlainTable, StatedTable, checked_table, number_array, numbers
+from graspatlas.world.pose import LARGEST, unit_quaternion
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

@@ -36,6 +36,7 @@ from graspatlas.problem.validation import (
     check_freedom,
     check_joints,
     check_lengths,
+    check_obstacles,
     check_poses,
     check_reference,
     check_touch,
@@ -45,6 +46,7 @@ from graspatlas.problem.validation import (
 from graspatlas.support.arrays import Array
 from graspatlas.support.pickling import Light
 from graspatlas.support.validation import PlainTable, StatedTable, checked_table, number, number_array, read_only, shown
+from graspatlas.world.obstacle import Obstacle
 
 __all__ = ["Problem"]
 
@@ -76,6 +78,7 @@ class Problem(Light):
             ``torque_arm`` finds one.
         defaults: ``dimension``, ``radius``, ``epsilon`` and ``quality`` to use when the caller names none.
         requirements: What the best grasp must meet when the caller does not say.
+        obstacles: What the hand must not touch beside the object: they count wherever collisions are looked at.
         description, source: For people.
 
     Raises:
@@ -97,6 +100,7 @@ class Problem(Light):
     source: str = ""
     pose_guess: PoseGuess | None = None
     torque_length: float | None = None
+    obstacles: tuple[Obstacle, ...] = ()
 
     def __post_init__(self) -> None:
         check_types(vars(self), self.contacts)
@@ -105,6 +109,8 @@ class Problem(Light):
             object.__setattr__(self, "torque_length", float(number(self.torque_length, "torque_length")))
         object.__setattr__(self, "contacts", tuple(self.contacts))
         object.__setattr__(self, "requirements", tuple(self.requirements))
+        check_obstacles(self.obstacles)
+        object.__setattr__(self, "obstacles", tuple(self.obstacles))
         if not self.contacts:
             raise GraspAtlasError(f"problem '{self.name}' has no contact")
         check_lengths(self.length_scale, self.torque_length)
@@ -347,6 +353,8 @@ class Problem(Light):
         }
         if self.requirements:
             table["requirements"] = [requirement.to_dict() for requirement in self.requirements]
+        if self.obstacles:
+            table["obstacles"] = [obstacle.to_dict() for obstacle in self.obstacles]
         if self.torque_length is not None:
             table["torque_length"] = self.torque_length
         if self.reference is not None:
@@ -373,6 +381,7 @@ class Problem(Light):
             "requirements",
             "x1",
             "reference",
+            "obstacles",
         )
         table = checked_table(data, "the problem", ("name", "hand", "object", "contacts"), (*optional, "torque_length"))
         body = dict(checked_table(table["object"], "the object", ("urdf",), None))
@@ -394,6 +403,7 @@ class Problem(Light):
             torque_length=table.get("torque_length"),
             defaults=dict(checked_table(table.get("defaults") or {}, "defaults", (), DEFAULTS)),
             requirements=tuple(map(requirement_from_dict, table.get("requirements") or ())),
+            obstacles=tuple(Obstacle.from_dict(item, folder) for item in table.get("obstacles") or ()),
             description=str(table.get("description", "")),
             source=str(table.get("source", "")),
         )

@@ -17,6 +17,7 @@ from graspatlas.problem.object_joint import ObjectJoint
 from graspatlas.problem.pose_guess import PoseGuess
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import checked_instance, checked_table, number
+from graspatlas.world.obstacle import Obstacle
 
 __all__ = [
     "DEFAULTS",
@@ -24,6 +25,7 @@ __all__ = [
     "check_freedom",
     "check_joints",
     "check_lengths",
+    "check_obstacles",
     "check_poses",
     "check_reference",
     "check_touch",
@@ -67,6 +69,17 @@ def check_lengths(length_scale: float, torque_length: float | None) -> None:
         raise GraspAtlasError(f"length_scale must lie between {low:g} and {high:g} m, got {length_scale}")
     if torque_length is not None and not 0.0 < torque_length < np.inf:
         raise GraspAtlasError(f"torque_length must be positive, got {torque_length}")
+
+
+def check_obstacles(obstacles: Sequence[Obstacle]) -> None:
+    """Raise GraspAtlasError unless these are obstacles, each with a name of its own."""
+    checked_instance(obstacles, (list, tuple), "obstacles")
+    names: set[str] = set()
+    for obstacle in obstacles:
+        checked_instance(obstacle, Obstacle, "an obstacle", "Obstacle.box or Obstacle.plane")
+        if obstacle.name in names:
+            raise GraspAtlasError(f"two obstacles are called '{obstacle.name}'; give each a name of its own")
+        names.add(obstacle.name)
 
 
 def check_poses(joint: ObjectJoint, x1: FirstGrasp | None, guess: PoseGuess | None) -> None:

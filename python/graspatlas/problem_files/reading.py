@@ -15,7 +15,7 @@ from graspatlas.hand.body import Body
 from graspatlas.hand.hand import Hand
 from graspatlas.hand.motions import HandMotions, coupling_rows
 from graspatlas.hand.robot_files import described_robot, example_robot, find_file, is_mjcf
-from graspatlas.hand.urdf import mesh_urdf, moving_joints
+from graspatlas.hand.urdf import moving_joints
 from graspatlas.problem.contacts import Contact
 from graspatlas.problem.first_grasp import FirstGrasp
 from graspatlas.problem.pose_guess import PoseGuess
@@ -25,9 +25,18 @@ from graspatlas.problem_files import documents
 from graspatlas.problem_files.faults import ProblemFileError, faults_of_validation, narrowed, one_line
 from graspatlas.problem_files.mesh_patches import PatchesOfMeshes
 from graspatlas.problem_files.postures import read_postures
-from graspatlas.problem_files.schema import ContactTable, HandTable, MotionsTable, ObjectTable, ProblemTable
+from graspatlas.problem_files.schema import (
+    ContactTable,
+    HandTable,
+    MotionsTable,
+    ObjectTable,
+    ObstacleTable,
+    ProblemTable,
+)
 from graspatlas.problem_files.schema_tables import Table
 from graspatlas.requirements.named import requirement_from_dict
+from graspatlas.world.obstacle import Obstacle, mesh_body
+from graspatlas.world.pose import Pose
 
 __all__ = ["FILL_IN", "read_problem"]
 
@@ -100,6 +109,7 @@ class _Reading:
             with self._within("hand_motions"):
                 motions = self._motions(table.hand_motions, hand, moving_joints(full.urdf))
         requirements = tuple(self._requirement(i, requirement) for i, requirement in enumerate(table.requirements))
+        obstacles = tuple(self._obstacle(i, obstacle) for i, obstacle in enumerate(table.obstacles))
         stated = self.document.data
         if stated.get("x1") is not None:
             with self._within("x1"):
@@ -121,6 +131,7 @@ class _Reading:
                 source=table.source,
                 pose_guess=guess,
                 torque_length=stated.get("torque_length"),
+                obstacles=obstacles,
             )
 
     def _hand(self, table: HandTable) -> tuple[Hand, Hand]:
@@ -148,6 +159,13 @@ class _Reading:
         with self._within("requirements", i):
             return requirement_from_dict(table.model_dump(exclude_none=True))
 
+    def _obstacle(self, i: int, table: ObstacleTable) -> Obstacle:
+        with self._within("obstacles", i):
+            pose = Pose(table.xyz, table.quat_xyzw)
+            if table.plane is not None:
+                return Obstacle(table.name, None, table.plane.normal, table.frame, pose)
+            return Obstacle(table.name, self._object(table), None, table.frame, pose)
+
     def _whole_hand(self, table: HandTable) -> Hand:
         """The hand as its URDF has it, with the limits that are stated."""
         plain = table.model_dump(
@@ -173,7 +191,7 @@ class _Reading:
         given = {"mjcf": path, "root": table.root, "name": table.name, "srdf": table.srdf}
         return Hand.from_dict({**given, "limits": table.limits}, self.folder)
 
-    def _object(self, table: ObjectTable) -> Body:
+    def _object(self, table: ObjectTable | ObstacleTable) -> Body:
         name = table.name
         if table.sphere is not None:
             return Body.sphere(name or "sphere", table.sphere.radius)
@@ -188,13 +206,9 @@ class _Reading:
         )
         return Body.from_dict(plain, self.folder)
 
-    def _mesh(self, mesh: str, table: ObjectTable) -> Body:
+    def _mesh(self, mesh: str, table: ObjectTable | ObstacleTable) -> Body:
         path = find_file(mesh, self.folder, tuple(table.package_paths)).resolve()
-        name, scale = table.name or path.stem, table.scale
-        scales = scale if isinstance(scale, list) else [1.0 if scale is None else scale] * 3
-        folder = str(path.parent.parent)
-        urdf = mesh_urdf(name, f"package://{path.parent.name}/{path.name}", scales)
-        return Body(name, urdf, package_dirs=(folder,), package_paths=(folder,))
+        return mesh_body(table.name or path.stem, path, 1.0 if table.scale is None else table.scale)
 
     def _motions(self, table: MotionsTable, hand: Hand, known: tuple[str, ...]) -> HandMotions:
         """Hand motions of the joints that move; what is said of locked ones is left out."""

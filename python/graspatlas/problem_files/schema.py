@@ -135,6 +135,41 @@ class ObjectTable(BodyTable):
         return self
 
 
+class PlaneShape(Table):
+    """All that lies on the one side of a plane."""
+
+    normal: Vector = Field([0.0, 0.0, 1.0], description="Its normal, out of the obstacle.")
+
+
+class ObstacleTable(BodyTable):
+    """A thing that the hand must not touch beside the object."""
+
+    name: str = Field(description="Its name, such as table.")
+    frame: Literal["object", "palm"] = Field(
+        "object", description="What it is fixed to: the object, as a table is on which it stands, or the palm."
+    )
+    xyz: Vector = Field([0.0, 0.0, 0.0], description="Its position there [m]; a plane goes through it.")
+    quat_xyzw: Quaternion = Field([0.0, 0.0, 0.0, 1.0], description="Its rotation; it is normalised.")
+    plane: PlaneShape | None = Field(None, description="All that lies on the one side of a plane.")
+    mesh: str | None = Field(
+        None, description="Path of a mesh file (OBJ, STL, DAE), absolute or relative to this file."
+    )
+    scale: Positive | Scale | None = Field(
+        None, description="From the mesh's unit to metres, such as 0.001; 1 by default."
+    )
+    sphere: SphereShape | None = Field(None, description="A sphere.")
+    box: BoxShape | None = Field(None, description="A box.")
+    cylinder: CylinderShape | None = Field(None, description="A cylinder along z.")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> ObstacleTable:
+        exactly_one(self, ("plane", *OBJECT_SOURCES), "an obstacle")
+        if self.scale is not None and self.mesh is None:
+            message = "scale is for a mesh; state other sizes in metres"
+            raise PydanticCustomError("scale_of_shape", "{message}", {"message": message})
+        return self
+
+
 class MotionsTable(Table):
     """Principal hand motions: recorded postures, or their mean and covariance; and couplings of joints."""
 
@@ -306,6 +341,9 @@ class ProblemTable(Table):
     )
     requirements: list[RequirementTable] = Field(
         default_factory=list, description="What the best grasp must meet when the caller does not say."
+    )
+    obstacles: list[ObstacleTable] = Field(
+        default_factory=list, description="What the hand must not touch beside the object, such as a table."
     )
 
 

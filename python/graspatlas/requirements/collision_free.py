@@ -1,4 +1,4 @@
-"""The requirement that hand and object do not collide."""
+"""The requirement that hand, object and obstacles do not collide."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CLOSEST = 1e-5
 
 @dataclass(frozen=True)
 class CollisionFree(Requirement):
-    """The hand hits neither itself nor the object, the touching fingertips excepted; by coal.
+    """The hand hits neither itself nor the object nor an obstacle, fingertips on the object excepted; by coal.
 
     Attributes:
         touch_depth: Depth to which a link with a contact may sink into the object, since shapes are approximations [m].
@@ -44,7 +44,7 @@ class CollisionFree(Requirement):
         return self._checker(grasps.problem).free(grasps.x)
 
     def measures(self, problem: Problem, system: _core.GraspSystem) -> list[_core.Measure]:
-        """Distances of hand and object; see :meth:`Requirement.measures`."""
+        """Distances of hand, object and obstacles; see :meth:`Requirement.measures`."""
         return [_core.distances_measure(self._checker(problem).batch)]
 
     def slacks_near(self, grasp: Grasps) -> Slacks:

@@ -1,4 +1,4 @@
-"""Meshes of hand and object as a page carries them: one for each joint and colour."""
+"""Meshes of hand, object and obstacles as a page carries them: one for each joint and colour."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from graspatlas.viewer.scene.bodies import BodyShapes
 from graspatlas.viewer.scene.meshes import Mesh, merged
 from graspatlas.viewer.scene.scene import Colour
 from graspatlas.viewer.scene.stick_figure import sticks
+from graspatlas.world.obstacle import FRAMES
 
 __all__ = ["write_shapes"]
 
@@ -30,7 +31,8 @@ def write_shapes(problem: Problem, shapes: BodyShapes, numbers: Numbers) -> Plai
         numbers: Where to.
 
     Returns:
-        ``hand`` and ``object``, lists of a mesh's number, joint and colour, and ``sticks``: of a hand without meshes
+        ``hand`` and ``object``, lists of a mesh's number, joint and colour, ``obstacles``, such lists by the frame that
+        they are fixed to, and ``sticks``: of a hand without meshes
         the bones, from a point of one joint to a point of another, their radius, and that of the joints [m].
     """
     table: PlainTable = {"sticks": None}
@@ -39,6 +41,10 @@ def write_shapes(problem: Problem, shapes: BodyShapes, numbers: Numbers) -> Plai
     else:
         table["hand"], table["sticks"] = [], sticks(problem)
     table["object"] = _write(numbers, "object", ((mesh, 0, T, colour) for mesh, T, colour in shapes.object()))
+    table["obstacles"] = {
+        frame: _write(numbers, f"on_{frame}", ((mesh, 0, T, colour) for mesh, T, colour in shapes.obstacles(frame)))
+        for frame in FRAMES
+    }
     return table
 
 

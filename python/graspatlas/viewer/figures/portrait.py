@@ -84,7 +84,7 @@ def _corners(parts: list[Part]) -> Array:
 
 def _framed(parts: list[Part], direction: Array, aspect: float) -> Camera:
     """Camera that fills its picture with the parts."""
-    points = _corners(parts).reshape(-1, 3)
+    points = _corners([part for part in parts if part.group != "obstacle"]).reshape(-1, 3)
     camera = Camera(points.mean(axis=0), direction, 1.0)
     for _ in range(30):
         seen = camera.project(points, aspect)[:, :2]

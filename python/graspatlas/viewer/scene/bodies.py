@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
+
+import numpy as np
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
@@ -13,10 +16,15 @@ from graspatlas.hand.embedded_meshes import mesh_folders
 from graspatlas.hand.mesh_files import check_meshes
 from graspatlas.problem.problem import Problem
 from graspatlas.support.arrays import Array
-from graspatlas.viewer.scene.meshes import Mesh, from_shape
+from graspatlas.viewer.scene.meshes import Mesh, box, from_shape
 from graspatlas.viewer.scene.stick_figure import Shape, bones, outlines
 
 __all__ = ["BodyMeshes", "BodyShapes"]
+
+#: Red, green, blue and opacity of obstacles.
+OBSTACLE = (0.36, 0.50, 0.62, 0.30)
+#: Side of the plates that stand for planes, as a multiple of the object's diagonal; their thickness as a share of that.
+PLATE, THIN = 1.2, 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +93,7 @@ class BodyMeshes:
 
 
 class BodyShapes:
-    """Meshes of a problem's hand and object. What has none is sketched.
+    """Meshes of a problem's hand, object and obstacles. A hand or object that has none is sketched.
 
     Args:
         problem: The problem.
@@ -97,6 +105,7 @@ class BodyShapes:
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
         self._hand, self._object = BodyMeshes(problem.hand), BodyMeshes(problem.object)
+        self._obstacles: dict[str, BodyMeshes] = {}
 
     def hand(self, q: Array) -> Iterator[Shape]:
         """The hand at joint configuration q (nq,)."""
@@ -118,3 +127,30 @@ class BodyShapes:
     def object(self) -> Iterator[Shape]:
         """The object in its own frame."""
         return self._object.at_rest() if self._object.parts else outlines(self._problem)
+
+    def obstacles(self, frame: str) -> Iterator[Shape]:
+        """The obstacles that are fixed to the ``"object"`` or the ``"palm"``, there; of planes a plate below them."""
+        for obstacle in self._problem.obstacles:
+            if obstacle.frame != frame:
+                continue
+            T = obstacle.T_frame_shape
+            if obstacle.body is None:
+                yield box([self._plate, self._plate, THIN * self._plate]), T @ _sunk(0.5 * THIN * self._plate), OBSTACLE
+                continue
+            if obstacle.name not in self._obstacles:
+                self._obstacles[obstacle.name] = BodyMeshes(obstacle.body)
+            for mesh, T_body_mesh, _ in self._obstacles[obstacle.name].at_rest():
+                yield mesh, T @ T_body_mesh, OBSTACLE
+
+    @cached_property
+    def _plate(self) -> float:
+        """Side of the plates that stand for planes [m]."""
+        points = np.concatenate([mesh.moved(T).vertices for mesh, T, _ in self.object()])
+        return PLATE * float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def _sunk(depth: float) -> Array:
+    """The placement (4, 4) of what lies deeper by so much [m]."""
+    T = np.eye(4)
+    T[2, 3] = -depth
+    return T

@@ -18,7 +18,7 @@ from graspatlas.problem.problem import Problem
 from graspatlas.support.arrays import Array
 from graspatlas.viewer.scene.bodies import BodyMeshes, BodyShapes
 from graspatlas.viewer.scene.meshes import Mesh, arrow, ellipsoid, smooth
-from graspatlas.viewer.scene.scene import COLOURS, Colour, Part, vertices_of
+from graspatlas.viewer.scene.scene import COLOURS, Colour, Part, obstacle_parts, vertices_of
 
 __all__ = ["Mark", "Marked", "marked_hand", "marked_problem"]
 
@@ -142,6 +142,7 @@ def marked_problem(problem: Problem) -> Marked:
     size = _size_of(parts)
     for mesh, T, colour in shapes.object():
         parts.append(Part("object", mesh, T_object @ T, (*_lighter(colour)[:3], min(colour[3], 0.55))))
+    parts += obstacle_parts(shapes, T_object)
     marks = []
     for number, contact in enumerate(problem.contacts):
         T = placements[contact.frame]

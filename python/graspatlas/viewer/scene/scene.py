@@ -30,6 +30,7 @@ __all__ = [
     "direction_to",
     "fitted_camera",
     "grasp_parts",
+    "obstacle_parts",
     "outermost",
     "size_of",
     "subject_of",
@@ -81,7 +82,7 @@ class Part:
     """One mesh of one colour.
 
     Attributes:
-        group: ``hand``, ``object``, or what is drawn on top, a name in ``COLOURS``.
+        group: ``hand``, ``object``, ``obstacle``, or what is drawn on top, a name in ``COLOURS``.
         mesh: The mesh; the same one may stand in several parts.
         T: Its placement (4, 4).
         colour: Red, green, blue and opacity, each 0 to 1.
@@ -186,9 +187,20 @@ def outermost(points: Array) -> Array:
 
 
 def body_parts(shapes: BodyShapes, grasp: Grasp) -> list[Part]:
-    """Hand and object of a grasp, in the palm's frame."""
+    """Hand, object and obstacles of a grasp, in the palm's frame."""
     parts = [Part("hand", mesh, T, colour) for mesh, T, colour in shapes.hand(grasp.q)]
-    return parts + [Part("object", mesh, grasp.T_palm_object @ T, colour) for mesh, T, colour in shapes.object()]
+    parts += [Part("object", mesh, grasp.T_palm_object @ T, colour) for mesh, T, colour in shapes.object()]
+    return parts + obstacle_parts(shapes, grasp.T_palm_object)
+
+
+def obstacle_parts(shapes: BodyShapes, T_palm_object: Array) -> list[Part]:
+    """The obstacles, in the palm's frame, where the object is at a placement (4, 4)."""
+    placements = {"object": T_palm_object, "palm": np.eye(4)}
+    return [
+        Part("obstacle", mesh, T_palm_frame @ T, colour)
+        for frame, T_palm_frame in placements.items()
+        for mesh, T, colour in shapes.obstacles(frame)
+    ]
 
 
 def grasp_parts(shapes: BodyShapes, grasp: Grasp, size: float = 1.0) -> tuple[list[Part], Array]:

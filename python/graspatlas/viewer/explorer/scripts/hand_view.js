@@ -13,6 +13,7 @@ class Workshop {
     const shared = ({ mesh, joint, colour }) => ({ joint, geometry: this.geometry(numbers, mesh), material: this.material(colour) });
     this.hand = shapes.hand.map(shared);
     this.object = shapes.object.map(shared);
+    this.obstacles = { object: shapes.obstacles.object.map(shared), palm: shapes.obstacles.palm.map(shared) };
     this.ball = new THREE.SphereGeometry(1, 24, 16);
     this.rod = new THREE.CylinderGeometry(1, 1, 1, 20).rotateX(Math.PI / 2);
     this.arrow = this.arrowGeometry(...view.normal);
@@ -59,6 +60,10 @@ class Figure {
     this.object = this.group();
     for (const { joint, geometry, material } of workshop.hand) this.joints[joint].add(new THREE.Mesh(geometry, material));
     for (const { geometry, material } of workshop.object) this.object.add(new THREE.Mesh(geometry, material));
+    this.obstacles = { object: this.group(), palm: this.group() };
+    for (const [frame, group] of Object.entries(this.obstacles)) {
+      for (const { geometry, material } of workshop.obstacles[frame]) group.add(new THREE.Mesh(geometry, material));
+    }
     this.layers = {};
     this.contacts = facts.contacts.map(() => this.mark("contact", workshop.ball));
     this.normals = facts.contacts.map(() => this.mark("normal", workshop.arrow));
@@ -108,6 +113,7 @@ class Figure {
     this.read = read;
     this.placements.forEach((T, i) => setMatrix(this.joints[i], T));
     setMatrix(this.object, read.object);
+    setMatrix(this.obstacles.object, read.object);
     const { contact_radius: radius, normal: [length] } = facts.view;
     const largest = Math.max(...read.contacts.map(({ force }) => Math.hypot(...force)));
     read.contacts.forEach(({ point, normal, force }, i) => {
@@ -171,7 +177,7 @@ class HandView {
     this.orbit = new Orbit(this.canvas, { changed: () => this.stage.request() });
     this.orbit.look(new THREE.Vector3(...facts.view.direction));
     this.panes = [];
-    this.visible = { contact: true, normal: true, force: false, ellipsoid: true, object: true };
+    this.visible = { contact: true, normal: true, force: false, ellipsoid: true, object: true, obstacles: true };
     selection.on("grasps", () => this.update());
     selection.on("view", () => this.update());
   }
@@ -215,6 +221,7 @@ class HandView {
       const figure = this.figures[i];
       for (const [name, layer] of Object.entries(figure.layers)) layer.visible = this.visible[name];
       figure.object.visible = this.visible.object;
+      for (const group of Object.values(figure.obstacles)) group.visible = this.visible.obstacles;
       this.orbit.update(w / h);
       this.light(figure);
       renderer.setViewport(x, y, w, h);

@@ -59,6 +59,8 @@ class Controls {
       ["force", "contact forces", cssOf(FORCE_COLOUR), false],
       ["object", "object", "", true],
     ];
+    const { object, palm } = facts.shapes.obstacles;
+    if (object.length || palm.length) shown.push(["obstacles", "obstacles", "", true]);
     byId("layers").append(...shown.map(([name, text, colour, on]) => {
       const box = checkbox(text, on, (checked) => {
         this.hand.layers({ [name]: checked });
