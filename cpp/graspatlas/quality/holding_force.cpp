@@ -20,6 +20,9 @@ constexpr double kNoBudget = 1e4;      // units of normal force that stand for a
 constexpr double kSideShare = 0.95;    // of forces, how much those of facets have of the hull's and not of the centre's
 constexpr double kEnough = 1.1;        // times the least reach, beyond which a reach is known well enough
 
+/// Of at most six rows and columns: decompositions of one type for all spaces of disturbances, without allocation.
+using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+
 }  // namespace
 
 HoldingForce::HoldingForce(GraspSystem& system, HoldingLimits limits)
@@ -129,8 +132,7 @@ double HoldingForce::ball_radius(WrenchHull<D>& hull) {
   if (!program_.start(y_)) return 0.0;
   program_.center();
   y_ = program_.y();
-  const Eigen::Matrix<double, D, D> shape = program_.dikin_shape(reach_map_);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, D, D>> axes(shape);
+  const Eigen::SelfAdjointEigenSolver<Small> axes(program_.dikin_shape(reach_map_));
   optima_.resize(y_.size(), std::max<Eigen::Index>(optima_.cols(), 8 * D));
   typename WrenchHull<D>::Points points(D, 2 * D);
   double least = HUGE_VAL;
@@ -168,7 +170,7 @@ double HoldingForce::ball_radius(WrenchHull<D>& hull) {
 template <int D>
 std::vector<HoldingForce::Side> HoldingForce::sides_within(const WrenchHull<D>& hull, double distance) const {
   std::vector<Side> sides;
-  Eigen::Matrix<double, D, D> corners;
+  Small corners(D, D);
   Vector y(y_.size());
   for (const auto& side : hull.sides_within(distance)) {
     for (int k = 0; k < D; ++k) corners.col(k) = reach_map_ * optima_.col(side.corners[k]);
