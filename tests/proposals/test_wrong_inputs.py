@@ -34,6 +34,15 @@ WRONG = {
     "no end of time": ([HAND, "can.stl", "--max-seconds", "nan"], r"max_seconds must be a positive number"),
     "no scale": ([HAND, "can.stl", "--scale", "0"], r"scale must be a positive number, got 0"),
     "a negative seed": ([HAND, "can.stl", "--seed", "-3"], r"seed must be a whole number of at least 0, got -3"),
+    "no file of obstacles": ([HAND, "can.stl", "--obstacles", "no.yaml"], r"cannot read file of obstacles 'no\.yaml'"),
+    "a file without obstacles": ([HAND, "can.stl", "--obstacles", "bare.yaml"], r"bare\.yaml:1: obstacles: is missing"),
+    "a wrong obstacle": ([HAND, "can.stl", "--obstacles", "round.yaml"], r"round\.yaml:3: .*radius"),
+    "a list of nothing": ([HAND, "can.stl", "--obstacles", "list.yaml"], r"list\.yaml"),
+    "two tables": ([HAND, "can.stl", "--obstacles", "table.yaml", "--on-table"], r"two obstacles are called 'table'"),
+    "obstacles that nothing sees": (
+        [HAND, "can.stl", "--on-table", "--require", "force_closure"],
+        r"require collision_free too",
+    ),
     "no workers": ([HAND, "can.stl", "--workers", "0"], r"workers must be a whole number from 1 to"),
     "both": ([HAND, "can.stl", "--workers", "2", "--scheduler", "tcp://127.0.0.1:9"], r"not both"),
     "an empty address": ([HAND, "can.stl", "--scheduler", ""], r"scheduler must be an address such as"),
@@ -49,6 +58,10 @@ def meshes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     trimesh.creation.cylinder(30.0, 100.0).export(folder / "mm.stl")
     trimesh.creation.box((0.9, 0.8, 0.9)).export(folder / "crate.stl")
     (folder / "text.stl").write_text("hello\n")
+    (folder / "bare.yaml").write_text("name: nothing\n")
+    (folder / "list.yaml").write_text("- 1\n")
+    (folder / "round.yaml").write_text("obstacles:\n  - name: ball\n    sphere: {radius: -1}\n")
+    (folder / "table.yaml").write_text("obstacles:\n  - {name: table, plane: {}, xyz: [0, 0, -0.05]}\n")
     (folder / "empty.obj").write_text("v 0 0 0\n")
     return folder
 

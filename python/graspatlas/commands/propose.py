@@ -27,6 +27,12 @@ def add_commands(commands: Subcommands) -> None:
     some.add_argument("--scale", type=float, metavar="S", help="from the mesh's unit to metres, such as 0.001")
     some.add_argument("--fingers", type=int, metavar="N", help="how many fingertips touch; 3, or all of a smaller hand")
     some.add_argument("--links", nargs="+", metavar="LINK", help="links that may touch; the fingertips by default")
+    some.add_argument("--on-table", action="store_true", help="the object stands on a table, z being upwards")
+    some.add_argument(
+        "--obstacles",
+        metavar="FILE",
+        help="a file whose obstacles, stated as in a problem file, the hand must not touch",
+    )
     some.add_argument("--quality", metavar="NAME", help="index that ranks the grasps; holding_force by default")
     some.add_argument(
         "--require",
@@ -45,15 +51,18 @@ def add_commands(commands: Subcommands) -> None:
 
 
 def _propose(options: argparse.Namespace) -> int:
+    from graspatlas.problems import load_obstacles
     from graspatlas.proposals.outcome import ProposalsEnd
     from graspatlas.proposals.propose import PAGE, propose  # slow to import
     from graspatlas.requirements.named import parse_requirement
 
     names = ("scale", "fingers", "links", "quality", "top", "max_seconds", "seed", "workers", "scheduler")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    if options.obstacles is not None:
+        given["obstacles"] = load_obstacles(options.obstacles)
     if options.require:
         given["require"] = [parse_requirement(text) for text in options.require if text != "none"]
-    found = propose(options.hand, options.mesh, options.output, progress=True, **given)
+    found = propose(options.hand, options.mesh, options.output, on_table=options.on_table, progress=True, **given)
     say(json.dumps(found.to_dict()) if options.json else "\n".join(_lines(found)))
     say(f"wrote {options.output / PAGE}: open it in a browser", file=sys.stderr)
     if found.status is ProposalsEnd.INTERRUPTED:

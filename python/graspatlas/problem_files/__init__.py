@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from graspatlas.problem_files.faults import ProblemFileError
-    from graspatlas.problem_files.reading import read_problem
+    from graspatlas.problem_files.reading import read_obstacles, read_problem
     from graspatlas.problem_files.schema import json_schema
 
-__all__ = ["ProblemFileError", "json_schema", "read_problem"]
+__all__ = ["ProblemFileError", "json_schema", "read_obstacles", "read_problem"]
 
 #: Where names are defined; the schema takes longer to import than a list of problems to read.
-_HOMES = {"ProblemFileError": "faults", "read_problem": "reading", "json_schema": "schema"}
+_HOMES = {"ProblemFileError": "faults", "read_obstacles": "reading", "read_problem": "reading", "json_schema": "schema"}
 
 
 def __getattr__(name: str) -> Any:

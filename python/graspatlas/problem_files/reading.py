@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,16 +32,31 @@ from graspatlas.problem_files.schema import (
     ObjectTable,
     ObstacleTable,
     ProblemTable,
+    SurroundingsTable,
 )
 from graspatlas.problem_files.schema_tables import Table
 from graspatlas.requirements.named import requirement_from_dict
 from graspatlas.world.obstacle import Obstacle, mesh_body
 from graspatlas.world.pose import Pose
 
-__all__ = ["FILL_IN", "read_problem"]
+__all__ = ["FILL_IN", "read_obstacles", "read_problem"]
 
 #: What stands in a template where the user has to fill in something.
 FILL_IN = "FILL_IN"
+
+
+def read_obstacles(text: str, file: str = "obstacles.yaml", folder: Path | None = None) -> tuple[Obstacle, ...]:
+    """The obstacles that a text states as a problem file does, whatever else it states.
+
+    Args and errors are those of :func:`read_problem`.
+    """
+    document = _document(text, file)
+    try:
+        stated = document.data if isinstance(document.data, dict) else {}
+        table = SurroundingsTable.model_validate({key: stated[key] for key in stated if key == "obstacles"})
+    except ValidationError as error:
+        raise ProblemFileError(faults_of_validation(file, document, error)) from None
+    return _Reading(file, document, folder).obstacles(table.obstacles)
 
 
 def read_problem(text: str, file: str = "problem.yaml", folder: Path | None = None) -> Problem:
@@ -55,16 +70,20 @@ def read_problem(text: str, file: str = "problem.yaml", folder: Path | None = No
     Raises:
         ProblemFileError: If anything is wrong: file, line, field, what came and what is allowed.
     """
-    try:
-        document = documents.parse(text)
-    except documents.DocumentError as error:
-        raise ProblemFileError([f"{file}:{error.line}: {error}"]) from None
+    document = _document(text, file)
     _check_filled_in(file, document)
     try:
         table = ProblemTable.model_validate(document.data)
     except ValidationError as error:
         raise ProblemFileError(faults_of_validation(file, document, error)) from None
     return _Reading(file, document, folder).problem(table)
+
+
+def _document(text: str, file: str) -> documents.Document:
+    try:
+        return documents.parse(text)
+    except documents.DocumentError as error:
+        raise ProblemFileError([f"{file}:{error.line}: {error}"]) from None
 
 
 def _check_filled_in(file: str, document: documents.Document) -> None:
@@ -109,7 +128,7 @@ class _Reading:
             with self._within("hand_motions"):
                 motions = self._motions(table.hand_motions, hand, moving_joints(full.urdf))
         requirements = tuple(self._requirement(i, requirement) for i, requirement in enumerate(table.requirements))
-        obstacles = tuple(self._obstacle(i, obstacle) for i, obstacle in enumerate(table.obstacles))
+        obstacles = self.obstacles(table.obstacles)
         stated = self.document.data
         if stated.get("x1") is not None:
             with self._within("x1"):
@@ -133,6 +152,10 @@ class _Reading:
                 torque_length=stated.get("torque_length"),
                 obstacles=obstacles,
             )
+
+    def obstacles(self, tables: Sequence[ObstacleTable]) -> tuple[Obstacle, ...]:
+        """The obstacles."""
+        return tuple(self._obstacle(i, table) for i, table in enumerate(tables))
 
     def _hand(self, table: HandTable) -> tuple[Hand, Hand]:
         """The hand as its URDF has it, and the one with only those joints that move."""

@@ -347,6 +347,14 @@ class ProblemTable(Table):
     )
 
 
+class SurroundingsTable(Table):
+    """The part of a problem file that states what is around the object."""
+
+    obstacles: Annotated[list[ObstacleTable], Field(min_length=1)] = Field(
+        description="What the hand must not touch beside the object, such as a table."
+    )
+
+
 def json_schema() -> PlainTable:
     """JSON Schema of problem files, for editors."""
     schema = ProblemTable.model_json_schema()

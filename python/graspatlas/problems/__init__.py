@@ -9,8 +9,9 @@ from graspatlas.errors import GraspAtlasError, unknown_name
 from graspatlas.hand.robot_files import robots_folder
 from graspatlas.problem.problem import Problem
 from graspatlas.storage.files import is_file, read_text
+from graspatlas.world.obstacle import Obstacle
 
-__all__ = ["bundled_problems", "load_problem", "problem_text"]
+__all__ = ["bundled_problems", "load_obstacles", "load_problem", "problem_text"]
 
 #: Endings of problem files; JSON is a part of YAML.
 ENDINGS = (".yaml", ".yml", ".json")
@@ -36,6 +37,21 @@ def load_problem(name: str | Path) -> Problem:
     return read_problem(*problem_text(name))
 
 
+def load_obstacles(path: str | Path) -> tuple[Obstacle, ...]:
+    """Load the obstacles of a file that states them as a problem file does; whatever else it states is passed over.
+
+    Args:
+        path: A YAML or JSON file with ``obstacles:``.
+
+    Raises:
+        GraspAtlasError: If there is no such file, or it is wrong: the message names line and field.
+    """
+    from graspatlas.problem_files import read_obstacles  # slow to import
+
+    file = Path(path)
+    return read_obstacles(_text(file, "file of obstacles"), str(path), file.parent)
+
+
 def problem_text(name: str | Path) -> tuple[str, str, Path]:
     """Text of a problem file, its name, and the folder where its relative paths start.
 
@@ -51,8 +67,12 @@ def problem_text(name: str | Path) -> tuple[str, str, Path]:
     path = Path(name)
     if path.suffix not in ENDINGS and not is_file(path):
         raise unknown_name("problem", name, bundled_problems())
+    return _text(path, "problem file"), str(name), path.parent
+
+
+def _text(path: Path, what: str) -> str:
     try:
-        return read_text(path), str(name), path.parent
+        return read_text(path)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise GraspAtlasError(f"cannot read problem file '{path}': {reason}; correct the path") from None
+        raise GraspAtlasError(f"cannot read {what} '{path}': {reason}; correct the path") from None

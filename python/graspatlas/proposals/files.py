@@ -53,6 +53,8 @@ def problem_file(plan: Plan, problem: Problem, locked: Mapping[str, float], fold
         "defaults": dict(problem.defaults),
         "requirements": [requirement.to_dict() for requirement in problem.requirements],
     }
+    if problem.obstacles:
+        table["obstacles"] = [obstacle.to_dict() for obstacle in problem.obstacles]
     if problem.motions is not None:
         motions = problem.motions
         table["hand_motions"] = {

@@ -18,7 +18,7 @@ from graspatlas.storage.run_files import damaged, read_run_file, write_run_file
 __all__ = ["KeptLooks"]
 
 #: Changes when a look of an older version would not be the same.
-VERSION = 1
+VERSION = 2
 _KINDS = {"end": "U", "why": "U", "value": "f", "x": "f", "postures": "f"}
 
 
@@ -44,6 +44,7 @@ class KeptLooks:
             [requirement_name(requirement) for requirement in plan.requirements],
             plan.length_scale,
             plan.seed,
+            [obstacle.to_dict() for obstacle in plan.obstacles],
             [(each.name, each.score, each.fingers.hand.urdf) for each in assignments],
         ]
         stated_all = all(isinstance(requirement, StatedRequirement) for requirement in plan.requirements)

@@ -9,6 +9,7 @@ from graspatlas.hand.body import Body
 from graspatlas.quality.batched import Quality
 from graspatlas.requirements.base import RequirementLike
 from graspatlas.support.pickling import Light
+from graspatlas.world.obstacle import Obstacle
 
 __all__ = ["Plan"]
 
@@ -27,6 +28,7 @@ class Plan(Light):
         radius: r, of the charts of the atlases.
         length_scale: Length that counts as much as one radian [m].
         seed: Of the random numbers.
+        obstacles: What the hand must not touch beside the object.
     """
 
     hand: str
@@ -38,3 +40,4 @@ class Plan(Light):
     radius: float = 0.3
     length_scale: float = 0.01
     seed: int = 0
+    obstacles: tuple[Obstacle, ...] = ()

@@ -10,6 +10,7 @@ from pathlib import Path
 from graspatlas.cluster.workers import check_workers
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.named_hands import named_hand
+from graspatlas.problem.validation import check_obstacles
 from graspatlas.proposals.assignments.matching import Assignment
 from graspatlas.proposals.files import folder_name, problem_file, write_text
 from graspatlas.proposals.kept_looks import KeptLooks
@@ -31,6 +32,7 @@ from graspatlas.support.deadlines import deadline_after, seconds_until
 from graspatlas.support.interrupts import stoppable, stopping
 from graspatlas.support.progress import progress_bar
 from graspatlas.support.validation import whole
+from graspatlas.world.obstacle import Obstacle
 
 __all__ = ["MAX_SECONDS", "PAGE", "TABLE", "TOP", "propose"]
 
@@ -59,6 +61,8 @@ def propose(
     scale: float | None = None,
     fingers: int | None = None,
     links: Sequence[str] | None = None,
+    obstacles: Sequence[Obstacle] = (),
+    on_table: bool = False,
     quality: Quality = "holding_force",
     require: Sequence[RequirementLike] = REQUIREMENTS,
     top: int = TOP,
@@ -83,6 +87,8 @@ def propose(
         scale: From the mesh's unit to metres.
         fingers: How many fingertips touch; three by default, or all where the hand has fewer.
         links: Links that may touch; the fingertips by default.
+        obstacles: What the hand must not touch beside the object.
+        on_table: The object stands on a table: a plane below its lowest point, z being upwards, is an obstacle too.
         quality: The index that ranks the grasps.
         require: What they must meet; force closure at friction 0.5 and no collision by default.
         top: How many grasps to propose at most.
@@ -104,14 +110,26 @@ def propose(
     whole(top, "top")
     find_index(quality)
     check_requirements(require)
+    check_obstacles(obstacles)
+    _check_requirements_see(obstacles, on_table, require)
     whole(seed, "seed", 0)
     looker: Looker = here
     if workers is not None or scheduler is not None:
         check_workers("looking at assignments on workers", workers, scheduler)
         looker = OnWorkers(workers, scheduler)
     folder = writable_folder(output)
-    setting = made_ready(named_hand(os.fspath(hand)), Path(mesh), scale, folder, fingers, links, seed)
-    plan = Plan(setting.hand, setting.source, setting.body, setting.surface, quality, tuple(require), seed=seed)
+    around = (tuple(obstacles), on_table)
+    setting = made_ready(named_hand(os.fspath(hand)), Path(mesh), scale, folder, fingers, links, *around, seed)
+    plan = Plan(
+        setting.hand,
+        setting.source,
+        setting.body,
+        setting.surface,
+        quality,
+        tuple(require),
+        seed=seed,
+        obstacles=setting.obstacles,
+    )
     kept = KeptLooks(folder / "looks", plan, setting.assignments)
     looked, grown = _schedule(start, deadline, top)
     with progress_bar("assignments", total=len(setting.assignments), progress=progress) as bar:
@@ -134,6 +152,12 @@ def propose(
     write_regions(setting.regions, folder / REGIONS)
     write_page(found, f"{setting.body.name} by {setting.hand}", folder / PAGE)
     return found
+
+
+def _check_requirements_see(obstacles: Sequence[Obstacle], on_table: bool, require: Sequence[RequirementLike]) -> None:
+    """Raise GraspAtlasError where there are obstacles that no requirement looks at."""
+    if (obstacles or on_table) and not any(isinstance(each, CollisionFree) for each in require):
+        raise GraspAtlasError("obstacles count where grasps must be free of collision: require collision_free too")
 
 
 def _schedule(start: float, deadline: float, top: int) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,13 +15,17 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.body import Body
 from graspatlas.hand.named_hands import NamedHand
 from graspatlas.meshes.repair import repaired
+from graspatlas.problem.validation import check_obstacles
 from graspatlas.proposals.assignments.fingers import grips
 from graspatlas.proposals.assignments.matching import Assignment, Counts, assignments_of
+from graspatlas.proposals.assignments.planes import Planes
 from graspatlas.proposals.assignments.symmetry import region_symmetries
 from graspatlas.proposals.files import write_text
 from graspatlas.proposals.object_files import write_object
 from graspatlas.regions.find import find_regions
 from graspatlas.regions.region import Region
+from graspatlas.support.arrays import Array
+from graspatlas.world.obstacle import Obstacle
 
 if TYPE_CHECKING:
     import trimesh
@@ -41,6 +45,7 @@ class Setting:
         regions: Its regions, the largest first.
         assignments: The assignments, the most promising first.
         counts: How many there were, and why some were left out.
+        obstacles: What the hand must not touch beside the object.
         notes: What a user should know of hand and object, one sentence each.
     """
 
@@ -51,6 +56,7 @@ class Setting:
     regions: tuple[Region, ...]
     assignments: list[Assignment]
     counts: Counts
+    obstacles: tuple[Obstacle, ...]
     notes: tuple[str, ...]
 
 
@@ -61,6 +67,8 @@ def made_ready(
     folder: Path,
     fingers: int | None,
     links: Sequence[str] | None,
+    obstacles: tuple[Obstacle, ...],
+    on_table: bool,
     seed: int,
 ) -> Setting:
     """Read hand and mesh, write the object, and find the assignments.
@@ -72,6 +80,8 @@ def made_ready(
         folder: Where ``object.urdf`` and ``hand.srdf`` are written.
         fingers: How many fingertips touch; three by default, or all where there are fewer.
         links: Links that may touch; the fingertips by default.
+        obstacles: What the hand must not touch beside the object.
+        on_table: Whether the object stands on a table.
         seed: Of the random numbers.
 
     Raises:
@@ -90,8 +100,13 @@ def made_ready(
     regions = find_regions(fixed, scale=1.0)
     body, note = write_object(fixed, mesh.stem, folder)
     notes.append(note)
+    if on_table:
+        obstacles = (*obstacles, _table_below(fixed))
+        check_obstacles(obstacles)
+    planes = Planes.of(obstacles)
+    symmetries = region_symmetries(regions, _keeps(obstacles, planes))
     assignments, counts = assignments_of(
-        grips(hand, fingers, links), regions, region_symmetries(regions), np.random.default_rng(seed)
+        grips(hand, fingers, links), regions, symmetries, planes, np.random.default_rng(seed)
     )
     if not assignments:
         raise GraspAtlasError(
@@ -99,8 +114,28 @@ def made_ready(
             "size fits the hand, or name other links, such as the palm"
         )
     return Setting(
-        hand.name, dict(named.source), body, _digest(fixed), tuple(regions), assignments, counts, tuple(notes)
+        hand.name,
+        dict(named.source),
+        body,
+        _digest(fixed),
+        tuple(regions),
+        assignments,
+        counts,
+        obstacles,
+        tuple(notes),
     )
+
+
+def _table_below(mesh: trimesh.Trimesh) -> Obstacle:
+    """The table that an object stands on, z being upwards."""
+    (x, y, _), lowest = mesh.bounds.mean(axis=0), mesh.bounds[0, 2]
+    return Obstacle.plane("table", (float(x), float(y), float(lowest)))
+
+
+def _keeps(obstacles: Sequence[Obstacle], planes: Planes) -> Callable[[Array], bool]:
+    """Whether a rotation of the object leaves the obstacles that are fixed to it where they are, as far as known."""
+    bodies = any(each.frame == "object" and each.body is not None for each in obstacles)
+    return (lambda turn: False) if bodies else planes.kept_by
 
 
 def _digest(mesh: trimesh.Trimesh) -> str:

@@ -85,6 +85,7 @@ def problem_of(plan: Plan, assignment: Assignment) -> Problem:
         contacts=tuple(contacts),
         requirements=stated,
         length_scale=plan.length_scale,
+        obstacles=plan.obstacles,
         defaults={
             "dimension": DIMENSION,
             "radius": plan.radius,

@@ -15,6 +15,7 @@ import numpy as np
 
 from graspatlas.proposals.assignments.closure import imbalance
 from graspatlas.proposals.assignments.fingers import Fingers
+from graspatlas.proposals.assignments.planes import Planes
 from graspatlas.regions.region import Region
 from graspatlas.support.arrays import Array
 
@@ -65,28 +66,35 @@ class Counts:
 
     Attributes:
         all: All of them.
+        hidden: With a region that lies behind a plane that is an obstacle, such as the table.
         symmetric: The same as others by a symmetry of the object.
         unreachable: Such that no posture drawn could hold the object there, or comes near.
     """
 
     all: int = 0
+    hidden: int = 0
     symmetric: int = 0
     unreachable: int = 0
 
     @property
     def left(self) -> int:
         """Those that are looked at."""
-        return self.all - self.symmetric - self.unreachable
+        return self.all - self.hidden - self.symmetric - self.unreachable
 
     def __str__(self) -> str:
+        hidden = f"{self.hidden} behind an obstacle, " if self.hidden else ""
         return (
-            f"{self.all} assignments: {self.symmetric} the same as others by symmetry, {self.unreachable} out of reach "
-            f"of all postures that could hold anything, {self.left} left"
+            f"{self.all} assignments: {hidden}{self.symmetric} the same as others by symmetry, "
+            f"{self.unreachable} out of reach of all postures that could hold anything, {self.left} left"
         )
 
 
 def assignments_of(
-    grips: Sequence[Fingers], regions: Sequence[Region], symmetries: Sequence[tuple[int, ...]], rng: np.random.Generator
+    grips: Sequence[Fingers],
+    regions: Sequence[Region],
+    symmetries: Sequence[tuple[int, ...]],
+    planes: Planes,
+    rng: np.random.Generator,
 ) -> tuple[list[Assignment], Counts]:
     """All assignments worth a try, the most promising first.
 
@@ -94,24 +102,31 @@ def assignments_of(
         grips: The sets of fingertips.
         regions: The regions, the largest first.
         symmetries: See :func:`graspatlas.proposals.assignments.symmetry.region_symmetries`.
+        planes: Behind which no finger can be.
         rng: Random numbers.
     """
     counts, found = Counts(), []
+    hidden = {i for i, region in enumerate(regions) if planes.hides(region)}
     for fingers in grips:
         m = len(fingers.grip.pads)
-        usable = list(range(min(len(regions), int(MOST_TUPLES ** (1.0 / m)))))
-        tuples = list(product(usable, repeat=m))
-        counts.all += len(tuples)
+        usable = list(range(min(len(regions), len(hidden) + int(MOST_TUPLES ** (1.0 / m)))))
+        counts.all += len(usable) ** m
+        tuples = list(product([i for i in usable if i not in hidden], repeat=m))
+        counts.hidden += len(usable) ** m - len(tuples)
         kept = [each for each in tuples if each == min(tuple(s[i] for i in each) for s in symmetries)]
         counts.symmetric += len(tuples) - len(kept)
-        matched = _matched(fingers, regions, kept, rng)
+        matched = _matched(fingers, regions, kept, planes, rng)
         counts.unreachable += len(kept) - len(matched)
         found += matched
     return sorted(found, key=lambda each: each.score), counts
 
 
 def _matched(
-    fingers: Fingers, regions: Sequence[Region], tuples: Sequence[tuple[int, ...]], rng: np.random.Generator
+    fingers: Fingers,
+    regions: Sequence[Region],
+    tuples: Sequence[tuple[int, ...]],
+    planes: Planes,
+    rng: np.random.Generator,
 ) -> list[Assignment]:
     from scipy.spatial import cKDTree  # slow to import
 
@@ -121,9 +136,9 @@ def _matched(
     holding = imbalance(points, normals, FRICTION) < BALANCED
     if not holding.any() or not tuples:
         return []
-    q = q[holding]
-    tree = cKDTree(_features(points[holding], -normals[holding], LENGTH * size))
-    on = [region.sample(SETS, rng) for region in regions]
+    q, points = q[holding], points[holding]
+    tree = cKDTree(_features(points, -normals[holding], LENGTH * size))
+    on = [_drawn(region, planes, rng) for region in regions]
     drawn, outward = [], []
     for each in tuples:
         orders = [rng.permutation(SETS) for _ in each]
@@ -132,14 +147,34 @@ def _matched(
     features = _features(np.concatenate(drawn), np.concatenate(outward), LENGTH * size)
     distances, nearest = tree.query(features)
     distances, nearest = distances.reshape(len(tuples), SETS), nearest.reshape(len(tuples), SETS)
+    palms = _palms(points[nearest.ravel()], np.concatenate(drawn))
+    buried = planes.behind(palms).reshape(distances.shape)
     found = []
     for i, each in enumerate(tuples):
-        order = np.argsort(distances[i])[:STARTS]
+        order = np.lexsort([distances[i], buried[i]])[:STARTS]
         score = float(distances[i, order[0]])
         if score < OUT_OF_REACH:
             chosen = tuple(regions[r] for r in each)
             found.append(Assignment(fingers, chosen, score, q[nearest[i, order]], drawn[i][order]))
     return found
+
+
+def _drawn(region: Region, planes: Planes, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Points drawn on a region (SETS, 3), where fingertips have room if there is any, and their outward normals."""
+    points, outward = region.sample(SETS, rng)
+    room = np.flatnonzero(planes.touchable(points, outward))
+    if len(room) in (0, SETS):
+        return points, outward
+    chosen = rng.choice(room, SETS)
+    return points[chosen], outward[chosen]
+
+
+def _palms(pads: Array, points: Array) -> Array:
+    """Where the palm's origin is in the object's frame when pads (n, m, 3) in the palm's frame lie on points of it."""
+    at, on = pads.mean(axis=1, keepdims=True), points.mean(axis=1, keepdims=True)
+    U, _, Vt = np.linalg.svd(np.einsum("nma,nmb->nab", points - on, pads - at))
+    U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
+    return np.asarray(on[:, 0] - np.einsum("nab,nb->na", U @ Vt, at[:, 0]))
 
 
 def _features(points: Array, outward: Array, length: float) -> Array:

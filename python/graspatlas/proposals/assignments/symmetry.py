@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import permutations, product
 
 import numpy as np
@@ -20,11 +20,14 @@ SAME = 0.03
 SAMPLES = 40
 
 
-def region_symmetries(regions: Sequence[Region]) -> list[tuple[int, ...]]:
+def region_symmetries(
+    regions: Sequence[Region], keeps: Callable[[Array], bool] = lambda turn: True
+) -> list[tuple[int, ...]]:
     """Where each region goes by the rotations about principal or coordinate axes that turn the object into itself.
 
     Args:
         regions: The regions.
+        keeps: Whether a rotation (3, 3) leaves what stands around the object as it is; others do not count.
 
     Returns:
         For each rotation the numbers of the regions that take the places of all in turn; the first stays as it is.
@@ -43,7 +46,7 @@ def region_symmetries(regions: Sequence[Region]) -> list[tuple[int, ...]]:
     trees = [cKDTree(each) for each in dense]
     found = [tuple(range(len(regions)))]
     centers = np.array([region.center for region in regions]) - middle
-    for turn in (*_turns(axes), *_turns(np.eye(3)), *_turns_of_centers(centers, areas)):
+    for turn in filter(keeps, (*_turns(axes), *_turns(np.eye(3)), *_turns_of_centers(centers, areas))):
         moved = [(each - middle) @ turn.T + middle for each in samples]
         places = []
         for i, each in enumerate(moved):
