@@ -221,6 +221,22 @@ def test_the_drawn_hand_is_where_pinocchio_places_it(name: str, tab: Tab, tmp_pa
 
 @pytest.mark.browser
 @pytest.mark.slow
+def test_the_table_is_level_and_the_hand_where_it_is_to_it(planar_result: ga.Result, tab: Tab, tmp_path: Path) -> None:
+    table = ga.Obstacle.plane("table", (0.0, 0.0, -0.1), (0.6, 0.0, 0.8))
+    result = replace(planar_result, problem=replace(planar_result.problem, obstacles=(table,)))
+    export_html(result, tmp_path / "page.html")
+    tab.open((tmp_path / "page.html").as_uri() + "#chart=33")
+    figure, pose = "graspatlas.hand.figures[0]", result.grasp(33).T_palm_object
+    palm, body = (
+        np.array(tab.run(f"{figure}.{which}.matrix.elements")).reshape(4, 4).T for which in ("palm", "object")
+    )
+    assert np.abs(body - pose).max() < PRECISE
+    assert np.abs(palm[:3, :3] @ pose[:3, :3] @ [0.6, 0.0, 0.8] - [0.0, 0.0, 1.0]).max() < PRECISE
+    assert tab.run(f"{figure}.joints.every((joint) => joint.parent === {figure}.palm)")
+
+
+@pytest.mark.browser
+@pytest.mark.slow
 def test_hands_without_meshes_are_sketched(planar_result: ga.Result, tab: Tab, tmp_path: Path) -> None:
     problem = planar_result.problem
     bare = re.sub(r"<(visual|collision)\b.*?</\1>", "", problem.hand.urdf, flags=re.DOTALL)

@@ -19,7 +19,7 @@ from graspatlas.viewer import save_picture
 from graspatlas.viewer.scene import bodies, meshes
 from graspatlas.viewer.scene import stick_figure as sketch
 from graspatlas.viewer.scene import velocity_ellipsoid as ellipsoid
-from graspatlas.viewer.scene.scene import CONTACT_RADIUS, Scene, grasp_parts
+from graspatlas.viewer.scene.scene import CONTACT_RADIUS, Scene, grasp_parts, upright_parts
 
 Array = NDArray[np.float64]
 
@@ -182,5 +182,26 @@ def test_obstacles_are_drawn_where_they_are_and_see_through(small_result: ga.Res
     up = grasp.T_palm_object[:3, 2]
     assert (plate @ up).max() == pytest.approx(grasp.object_xyz @ up - 0.1)
     assert_allclose((ball.min(axis=0) + ball.max(axis=0)) / 2.0, [0.0, 0.0, 0.2], atol=1e-3)
-    bare, shown = Scene(small_result), Scene(result)
+    alone = replace(small_result, problem=replace(small_result.problem, obstacles=(table,)))
+    bare, shown = Scene(alone), Scene(result)
     assert_allclose(shown.camera(1.5, (-0.9, 0.9, -0.5, 0.8)).target, bare.camera(1.5, (-0.9, 0.9, -0.5, 0.8)).target)
+
+
+@pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)])
+def test_the_table_is_level_with_the_grasp_on_it(small_result: ga.Result, normal: tuple[float, float, float]) -> None:
+    table = ga.Obstacle.plane("table", (0.0, 0.0, -0.1), normal)
+    grasp = replace(small_result, problem=replace(small_result.problem, obstacles=(table,))).best
+    shapes = bodies.BodyShapes(grasp.problem)
+    there, level = grasp_parts(shapes, grasp)[0], upright_parts(shapes, grasp)[0]
+    turn = level[0].T @ np.linalg.inv(there[0].T)
+    assert_allclose(turn[:3, :3] @ turn[:3, :3].T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+    for before, after in zip(there, level, strict=True):
+        assert_allclose(after.T, turn @ before.T, atol=1e-12)
+    (plate,) = (part.mesh.moved(part.T).vertices for part in level if part.group == "obstacle")
+    lower, upper = np.unique(plate[:, 2].round(9))
+    assert upper - lower > 0.001
+    height = (turn @ grasp.T_palm_object)[2, 3] - upper
+    assert height == pytest.approx(0.1 * normal[2], abs=1e-8), (
+        "the object's origin is as far above it as in its own frame"
+    )

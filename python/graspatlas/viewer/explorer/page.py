@@ -34,10 +34,11 @@ from graspatlas.viewer.scene.scene import (
     NORMAL_RADIUS,
     body_parts,
     direction_to,
-    grasp_parts,
     outermost,
     size_of,
     subject_of,
+    up_of_object,
+    upright_parts,
     vertices_of,
 )
 from graspatlas.viewer.web.page import meshcat_script
@@ -171,10 +172,12 @@ def _view(result: GraspAtlas, shapes: BodyShapes) -> PlainTable:
     if result.refinement:
         grasps[0] = result.refined_best
     size = size_of(body_parts(shapes, grasps[0]))
-    parts = [grasp_parts(shapes, grasp, size)[0] for grasp in grasps]
+    parts = [upright_parts(shapes, grasp, size)[0] for grasp in grasps]
     subjects = [subject_of(some, grasp, size) for some, grasp in zip(parts, grasps, strict=True)]
     points: Array = np.concatenate([vertices_of(some, ("hand", "object", "normal")) for some in parts])
+    up = up_of_object(result.problem)
     return {
+        "up": None if up is None else up.tolist(),
         "direction": direction_to(subjects, result.problem.object_joint_model).tolist(),
         "points": outermost(points).round(4).ravel().tolist(),
         "contact_radius": size * CONTACT_RADIUS,

@@ -15,7 +15,7 @@ from graspatlas.viewer.render.shading import Shadow, lamps, to_linear
 from graspatlas.viewer.scene.bodies import BodyShapes
 from graspatlas.viewer.scene.camera import Camera
 from graspatlas.viewer.scene.meshes import merged
-from graspatlas.viewer.scene.scene import SHOW_THROUGH, Part, grasp_parts
+from graspatlas.viewer.scene.scene import SHOW_THROUGH, Part, upright_parts
 from graspatlas.viewer.scene.viewpoint import Subject, best_direction
 
 __all__ = ["common_direction", "portrait"]
@@ -34,7 +34,8 @@ def common_direction(problem: Problem, grasps: list[Grasp]) -> Array:
     for grasp in grasps:
         parts = _parts(shapes, grasp)
         hand, body = (merged([p.mesh.moved(p.T) for p in parts if p.group == g]) for g in ("hand", "object"))
-        subjects.append(Subject.of(hand, body, grasp.contact_points))
+        points = np.array([part.T[:3, 3] for part in parts if part.group == "contact"]).reshape(-1, 3)
+        subjects.append(Subject.of(hand, body, points))
     return best_direction(subjects)
 
 
@@ -46,7 +47,8 @@ def portrait(
     Args:
         problem: The problem.
         grasp: One of its grasps.
-        direction: Unit vector [3] towards the camera, in the palm's frame; the one that sees most by default.
+        direction: Unit vector [3] towards the camera, in the palm's frame, turned until the plane is
+            level on which the object stands, if it stands on one; the one that sees most by default.
         width: Width in pixels.
         height: Height in pixels.
 
@@ -74,7 +76,7 @@ def portrait(
 
 
 def _parts(shapes: BodyShapes, grasp: Grasp) -> list[Part]:
-    return [part for part in grasp_parts(shapes, grasp)[0] if part.group != "ellipsoid"]
+    return [part for part in upright_parts(shapes, grasp)[0] if part.group != "ellipsoid"]
 
 
 def _corners(parts: list[Part]) -> Array:

@@ -11,6 +11,7 @@ from graspatlas.collision.hulls import hull_of
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasp import Grasp
 from graspatlas.problem.object_joint import ObjectJoint
+from graspatlas.problem.problem import Problem
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.support.arrays import Array
 from graspatlas.viewer.scene.bodies import BodyShapes
@@ -34,6 +35,8 @@ __all__ = [
     "outermost",
     "size_of",
     "subject_of",
+    "up_of_object",
+    "upright_parts",
     "vertices_of",
 ]
 
@@ -119,6 +122,8 @@ class Exhibit:
 class Scene:
     """The best grasp on the left, the worst on the right, seen from one direction.
 
+    The palm is as in its own frame, unless the object stands on a plane: that one is level then.
+
     Args:
         result: The result.
         worst: Whether the worst grasp is shown.
@@ -135,7 +140,7 @@ class Scene:
         if worst and result.accepted.any():
             grasps.append(("worst", result.worst))
         size = size_of(body_parts(shapes, best))
-        sides = [(name, grasp, *grasp_parts(shapes, grasp, size)) for name, grasp in grasps]
+        sides = [(name, grasp, *upright_parts(shapes, grasp, size)) for name, grasp in grasps]
         subjects = [subject_of(parts, grasp, size) for _, grasp, parts, _ in sides]
         self.direction = direction_to(subjects, result.problem.object_joint_model)
         right = Camera(np.zeros(3), self.direction, 1.0).axes[0]
@@ -232,6 +237,34 @@ def grasp_parts(shapes: BodyShapes, grasp: Grasp, size: float = 1.0) -> tuple[li
     return parts, semi_axes
 
 
+def upright_parts(shapes: BodyShapes, grasp: Grasp, size: float = 1.0) -> tuple[list[Part], Array]:
+    """The parts and semi-axes of :func:`grasp_parts`, with the plane level on which the object stands."""
+    parts, semi_axes = grasp_parts(shapes, grasp, size)
+    T = _upright(grasp)
+    return [Part(p.group, p.mesh, T @ p.T, p.colour) for p in parts], semi_axes
+
+
+def up_of_object(problem: Problem) -> Array | None:
+    """The normal (3,) of the plane on which the object stands, in the object's frame, if it stands on one."""
+    planes = [each for each in problem.obstacles if each.frame == "object" and each.body is None]
+    return planes[0].T_frame_shape[:3, 2] if planes else None
+
+
+def _upright(grasp: Grasp) -> Array:
+    """The rotation (4, 4) of the palm's frame that levels the plane on which the object stands."""
+    T, normal = np.eye(4), up_of_object(grasp.problem)
+    if normal is None:
+        return T
+    up = grasp.T_palm_object[:3, :3] @ normal
+    about, cosine = np.cross(up, (0.0, 0.0, 1.0)), float(up[2])
+    if np.linalg.norm(about) < 1e-9:
+        T[:3, :3] = np.diag([1.0, np.sign(cosine), np.sign(cosine)])
+        return T
+    K = np.cross(about, np.eye(3)).T
+    T[:3, :3] = np.eye(3) + K + K @ K / (1.0 + cosine)
+    return T
+
+
 def vertices_of(parts: list[Part], groups: tuple[str, ...] = ("hand", "object")) -> Array:
     """All vertices of parts of some groups (n, 3)."""
     return np.concatenate([p.mesh.moved(p.T).vertices for p in parts if p.group in groups])
@@ -249,7 +282,7 @@ def subject_of(parts: list[Part], grasp: Grasp, size: float) -> Subject:
     groups = [[p for p in parts if p.group == group] or marks for group in ("hand", "object")]
     T = np.diag([1.0 / size, 1.0 / size, 1.0 / size, 1.0])
     hand, body = (merged([p.mesh.moved(T @ p.T) for p in group]) for group in groups)
-    return Subject.of(hand, body, grasp.contact_points / size)
+    return Subject.of(hand, body, np.array([T[:3, :3] @ mark.T[:3, 3] for mark in marks]).reshape(-1, 3))
 
 
 def _side(parts: list[Part], right: Array, sign: float, size: float) -> tuple[Part, ...]:

@@ -56,6 +56,8 @@ class Figure {
     this.workshop = workshop;
     this.placements = kinematics.room();
     this.scene = new THREE.Scene();
+    // In the palm's frame, which is turned until the plane is level on which the object stands.
+    this.palm = this.group(this.scene);
     this.joints = this.placements.map(() => this.group());
     this.object = this.group();
     for (const { joint, geometry, material } of workshop.hand) this.joints[joint].add(new THREE.Mesh(geometry, material));
@@ -75,7 +77,7 @@ class Figure {
     this.scene.add(...this.lamps);
   }
 
-  group(parent = this.scene) {
+  group(parent = this.palm) {
     const made = new THREE.Group();
     made.matrixAutoUpdate = false;
     parent.add(made);
@@ -99,7 +101,7 @@ class Figure {
     const mesh = (geometry, material) => {
       const made = new THREE.Mesh(geometry, material);
       made.matrixAutoUpdate = false;
-      this.scene.add(made);
+      this.palm.add(made);
       return made;
     };
     return {
@@ -112,6 +114,10 @@ class Figure {
   show(read) {
     this.read = read;
     this.placements.forEach((T, i) => setMatrix(this.joints[i], T));
+    if (facts.view.up) {
+      const up = new THREE.Vector3(...rotated(read.object, facts.view.up));
+      this.palm.matrix.makeRotationFromQuaternion(new THREE.Quaternion().setFromUnitVectors(up, new THREE.Vector3(0, 0, 1)));
+    }
     setMatrix(this.object, read.object);
     setMatrix(this.obstacles.object, read.object);
     const { contact_radius: radius, normal: [length] } = facts.view;
