@@ -2,7 +2,9 @@
 
 Prints a row for each; a thing counts where at least one proposal's best grasp is accepted and survives.
 
-    python benchmarks/proposals.py [--hands allegro_right_hand ...] [--things mug ...]
+    python benchmarks/proposals.py [--hands allegro_right_hand ...] [--things mug ...] [--output FOLDER]
+
+`docs/make_proposals.py FOLDER` draws the best of each.
 """
 
 from __future__ import annotations
@@ -44,12 +46,14 @@ def main() -> None:
     words.add_argument("--hands", nargs="+", default=hands())
     words.add_argument("--things", nargs="+", default=sorted(path.stem for path in THINGS.glob("*.stl")))
     words.add_argument("--max-seconds", type=float, default=90.0)
+    words.add_argument("--output", type=Path, help="keep what is proposed there, a folder for each hand and thing")
     options = words.parse_args()
     done = 0
     for hand in options.hands:
         for thing in options.things:
             start = time.perf_counter()
-            with tempfile.TemporaryDirectory() as folder:
+            with tempfile.TemporaryDirectory() as passing:
+                folder = Path(passing) if options.output is None else options.output / f"{Path(hand).stem}-{thing}"
                 found = ga.propose(hand, THINGS / f"{thing}.stl", folder, max_seconds=options.max_seconds)
                 seconds = time.perf_counter() - start
                 survive = survivors(found)
