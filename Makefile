@@ -10,7 +10,7 @@ $(BIN)/pybind11-stubgen graspatlas._core --output-dir $(1) --numpy-array-use-typ
 $(BIN)/ruff format --quiet --config pyproject.toml $(1)/graspatlas/_core.pyi
 endef
 
-.PHONY: demo test test-slow sanitize bench compare lint stubs format wheel clean
+.PHONY: demo test test-slow sanitize bench compare docs lint stubs format wheel clean
 
 demo: $(VENV)/.installed
 	$(BIN)/graspatlas optimize schunk_can --require force_closure:0.5:0.02 --require collision_free --refine --output out/schunk_can
@@ -42,6 +42,12 @@ bench: $(VENV)/.tools
 compare: $(VENV)/.tools
 	$(BIN)/python -m pip install --quiet "graspatlas[compare]"
 	$(BIN)/python benchmarks/compare.py
+
+# The documentation site, in build/docs/html; warnings are errors. It needs the network for Sphinx alone, the first time.
+docs: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet "graspatlas[docs]"
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --doctree-dir build/docs/doctrees docs build/docs/html
+	@echo "Open build/docs/html/index.html in a browser."
 
 lint: $(VENV)/.tools
 	$(BIN)/ruff check .

@@ -36,7 +36,7 @@ __all__ = ["Samples", "by_promise", "densify", "jumps"]
 
 @dataclass(frozen=True, eq=False)
 class Samples(Grid):
-    """Grasps on a grid that is denser than the charts' centres, with their qualities; see :class:`Grid`.
+    """Grasps on a grid that is denser than the charts' centres, with their qualities; see ``Grid``.
 
     Attributes:
         problem: The problem.
@@ -78,7 +78,7 @@ class Samples(Grid):
 def densify(result: GraspAtlas, spacing: float, *, share: float = 1.0, progress: bool | None = None) -> Samples:
     """Read the index on a denser grid: inside the polytopes, at a spacing of your choice.
 
-    Everywhere, or where it promises most: see :func:`by_promise`. The charts are filled in that order, and Ctrl-C keeps
+    Everywhere, or where it promises most: see ``by_promise``. The charts are filled in that order, and Ctrl-C keeps
     what there is; the samples come by chart.
 
     Args:

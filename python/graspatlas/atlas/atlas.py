@@ -61,7 +61,7 @@ class Atlas(Light):
         audit: How it was looked for points that no chart covers.
         centers: Chart centres x_i [n, configuration_size].
         bases: Orthonormal tangent bases Phi_i, one tangent vector a row [n, k, tangent_size].
-        residuals: Largest entry of |R(x_i)| [n].
+        residuals: Largest entry of ``|R(x_i)|`` [n].
         regularities: About the smallest singular value of the Jacobian at each centre [n], its rows divided by their
             largest entries.
         nearly_singular: Charts within which the Jacobian loses rank, or falls below a tenth of that [n].
@@ -332,7 +332,7 @@ class Atlas(Light):
     def to_pandas(self, *, volumes: bool = False) -> DataFrame:
         """The charts as a table, one row a chart: centre, residual, neighbours, facets and closed vertices.
 
-        Columns are ``x0``, ``x1`` and so on, the numbers of the centre; ``residual``, the largest entry of |R(x)|;
+        Columns are ``x0``, ``x1`` and so on, the numbers of the centre; ``residual``, the largest entry of ``|R(x)|``;
         ``n_neighbours``; ``n_facets``; ``n_vertices``; and how many vertices were not expanded, by reason:
         ``closed_bounds``, ``closed_curvature``, ``closed_not_converged``, ``closed_covered``.
 

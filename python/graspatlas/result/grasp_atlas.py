@@ -65,7 +65,7 @@ class GraspAtlas(Light):
         quality: The index: its name, or the callable.
         qualities: Its value at each chart centre [n].
         quality_seconds: Time that its evaluation and that of the requirements took.
-        requirements: What a grasp must meet to be the best or the worst; a :class:`Lost` one where a file
+        requirements: What a grasp must meet to be the best or the worst; a ``Lost`` one where a file
             did not keep a function.
         accepted: Which charts meet the requirements [n].
         rejected: How many charts each requirement rejected, of those that the ones before it had left.

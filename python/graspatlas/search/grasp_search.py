@@ -62,8 +62,8 @@ def find_grasps(
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
     Returns:
-        The grasps, one a row (n, size of x), all with |R(x)| of at most 1e-9 and within all bounds; n is smaller than
-        `count`, perhaps 0, when the search ended early.
+        The grasps, one a row (n, size of x), all with ``|R(x)|`` of at most 1e-9 and within all bounds; n is smaller
+        than `count`, perhaps 0, when the search ended early.
 
     Raises:
         GraspAtlasError: If an argument is out of its range.
