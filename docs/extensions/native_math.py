@@ -9,8 +9,8 @@ from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.application import Sphinx
 
-#: An accented letter with something below it.
-ACCENTED = re.compile(r"<munder>(\s*<mover[^>]*>(?:(?!</mover>).)*</mover>)((?:(?!</munder>).)*)</munder>", re.DOTALL)
+#: An accented letter with its index below it: letter, index, accent.
+ACCENTED = re.compile(r"<munderover>\s*(<mi>.*?</mi>)\s*(<m\w+>.*?</m\w+>)\s*(<mo[^>]*>[ˆ˙¯~]</mo>)\s*</munderover>")
 
 
 def mathml(formula: str, block: bool) -> str:
@@ -19,7 +19,7 @@ def mathml(formula: str, block: bool) -> str:
     Docutils sets the index of an accented letter below the letter; it belongs beside it.
     """
     text = tex2mathml(formula, as_block=block)
-    return ACCENTED.sub(r"<msub>\1\2</msub>", text)
+    return ACCENTED.sub(r"<msub><mover>\1\3</mover>\2</msub>", text)
 
 
 def visit_inline(translator: Any, node: nodes.math) -> None:
