@@ -14,26 +14,18 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from screens import find_browser
+from screens import QUIET_FLAGS, find_browser
 
-FLAGS = (
-    "--headless=new",
-    "--no-sandbox",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--hide-scrollbars",
-    "--remote-debugging-pipe",
-)
+FLAGS = ("--headless=new", *QUIET_FLAGS, "--hide-scrollbars", "--remote-debugging-pipe")
 #: Starts a program that reads from 3 and writes to 4.
 ON_PIPES = """import fcntl, os, sys
 read, write = (fcntl.fcntl(int(end), fcntl.F_DUPFD, 10) for end in sys.argv[1:3])
 os.dup2(read, 3)
 os.dup2(write, 4)
 os.execv(sys.argv[3], sys.argv[3:])"""
+#: True in an explorer page that can be used, and in any other page that has all its pictures.
+READY = "document.documentElement && document.documentElement.dataset.ready === 'yes'"
+LOADED = "location.protocol === 'file:' && document.readyState === 'complete'"
 #: Time in which the browser must answer [s].
 PATIENCE = 30.0
 KEYS = {"Enter": ("Enter", 13, "\r"), "Escape": ("Escape", 27, ""), " ": ("Space", 32, " ")} | {
@@ -96,9 +88,16 @@ class Tab:
         return got["result"].get("value")
 
     def open(
-        self, address: str, width: int = 1000, height: int = 640, *, dark: bool = False, touch: bool = False
+        self,
+        address: str,
+        width: int = 1000,
+        height: int = 640,
+        *,
+        dark: bool = False,
+        touch: bool = False,
+        ready: str = READY,
     ) -> None:
-        """Open an explorer page, and wait until it is ready."""
+        """Open a page, by default an explorer page, and wait until it is ready."""
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": touch}
         self.ask("Emulation.setDeviceMetricsOverride", **size)
         self.ask("Emulation.setTouchEmulationEnabled", enabled=touch)
@@ -106,7 +105,7 @@ class Tab:
         self.ask("Emulation.setEmulatedMedia", features=[feature])
         self.ask("Page.navigate", url="about:blank")
         self.ask("Page.navigate", url=address)
-        self.wait_for("document.documentElement && document.documentElement.dataset.ready === 'yes'")
+        self.wait_for(ready)
         self.frames()
 
     def wait_for(self, condition: str, seconds: float = 30.0) -> None:

@@ -37,8 +37,8 @@ def share(picture: Array, colour: str) -> float:
     return float(found.mean())
 
 
-BROWSER_FLAGS = [
-    "--headless",
+#: What every browser is started with: nothing but the page.
+QUIET_FLAGS = [
     "--no-sandbox",
     "--enable-unsafe-swiftshader",
     "--disable-quic",
@@ -46,6 +46,10 @@ BROWSER_FLAGS = [
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
+]
+BROWSER_FLAGS = [
+    "--headless",
+    *QUIET_FLAGS,
     "--window-size=1200,800",
     "--virtual-time-budget=8000",
     "--enable-logging=stderr",

@@ -45,8 +45,8 @@ FLOORS = (
         "simulation",
         "formats",
     ),
-    *("viewer.scene", "viewer.render", "viewer.web", "viewer.explorer", "viewer.figures", "viewer"),
-    *("reproduce", "sweep", "commands", "cli", "__main__"),
+    *("viewer.scene", "viewer.films", "viewer.render", "viewer.web", "viewer.explorer", "viewer.figures", "viewer"),
+    *("reproduce", "sweep", "proposals", "commands", "cli", "__main__"),
 )
 #: Packages whose ``__init__`` is no face but defines what it offers.
 DEFINING = {f"{NAME}.{name}" for name in ("problems", "problem_files", "viewer", "viewer.figures", "reproduce")}

@@ -57,6 +57,8 @@ if typing.TYPE_CHECKING:
     from graspatlas.problem.pose_guess import PoseGuess
     from graspatlas.problem.problem import Problem
     from graspatlas.problems import bundled_problems, load_problem
+    from graspatlas.proposals.outcome import Proposal, Proposals, ProposalsEnd
+    from graspatlas.proposals.propose import propose
     from graspatlas.quality.batched import batched
     from graspatlas.regions.find import find_regions
     from graspatlas.regions.region import Region
@@ -116,6 +118,9 @@ __all__ = [
     "PoseGuess",
     "Pregrasp",
     "Problem",
+    "Proposal",
+    "Proposals",
+    "ProposalsEnd",
     "Recording",
     "Refinement",
     "Region",
@@ -162,6 +167,7 @@ __all__ = [
     "plot_planar_grasp",
     "plot_planar_indices",
     "project",
+    "propose",
     "quality",
     "record",
     "refine",
@@ -210,6 +216,8 @@ _HOMES: dict[str, tuple[str, ...]] = {
     "problem.pose_guess": ("PoseGuess",),
     "problem.problem": ("Problem",),
     "problems": ("bundled_problems", "load_problem"),
+    "proposals.outcome": ("Proposal", "Proposals", "ProposalsEnd"),
+    "proposals.propose": ("propose",),
     "quality.batched": ("batched",),
     "regions.find": ("find_regions",),
     "regions.region": ("Region",),

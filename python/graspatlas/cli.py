@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NoReturn, TextIO
 
-from graspatlas.commands.arguments import INTERRUPTED, MISUSE
+from graspatlas.commands.shared.arguments import INTERRUPTED, MISUSE
 from graspatlas.errors import GraspAtlasError
 from graspatlas.start_up import hear_interrupts
 from graspatlas.support.interrupts import stoppable, stopped_by
@@ -25,6 +25,7 @@ __all__ = ["main"]
 COMMANDS = {
     "listing": ("list", "doctor", "regions"),
     "problem": ("new", "check", "schema", "pads"),
+    "propose": ("propose",),
     "optimize": ("optimize",),
     "ladder": ("ladder",),
     "result": ("view", "export", "check-result"),

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from itertools import accumulate
 
 from graspatlas._core import GraspAtlasError
 
 __all__ = ["GraspAtlasError", "unknown_name"]
 
-#: Most names that a message lists.
-MOST_NAMES = 40
+#: Most names that a message lists, and their letters.
+MOST_NAMES, MOST_LETTERS = 40, 400
+
+
+def _listed(names: Sequence[str]) -> str:
+    """The first of the names, as many as can be read, and how many more there are."""
+    lengths = accumulate(len(name) + 2 for name in names[:MOST_NAMES])
+    shown = max(sum(length <= MOST_LETTERS for length in lengths), 1)
+    more = len(names) - shown
+    return ", ".join(names[:shown]) + (f" and {more} more" if more > 0 else "")
 
 
 def unknown_name(kind: str, name: object, known: Iterable[str], place: str = "") -> GraspAtlasError:
@@ -29,8 +38,7 @@ def unknown_name(kind: str, name: object, known: Iterable[str], place: str = "")
     near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
     near = near or [known_name for known_name in names if len(str(name)) > 2 and str(name) in known_name]
     where = f"not {place}" if place else "unknown"
-    more = len(names) - MOST_NAMES
-    listed = ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+    listed = _listed(names)
     hint = f"did you mean '{near[0]}'?" if near else f"known: {listed or 'none'}"
     shown = " ".join(str(name).split())[:80]
     return GraspAtlasError(f"{kind} '{shown}' is {where}; {hint}")

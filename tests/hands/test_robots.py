@@ -127,11 +127,11 @@ def depth(hull: ConvexHull, points: Array) -> Array:
 
 def collision_gaps(name: str, link: str) -> tuple[float, float]:
     """Return the largest distances collision to visual and visual to collision [m]."""
-    visual = np.vstack([sample(t, 7e-4) for t in visual_triangles(name, link)])
+    visual = np.vstack([sample(t, 1e-3) for t in visual_triangles(name, link)])
     hulls = list(collision_hulls(name, link))
     union = []
     for hull in hulls:
-        points = sample(hull.points[hull.simplices], 6e-4)
+        points = sample(hull.points[hull.simplices], 9e-4)
         buried = [depth(other, points) < -1e-6 for other in hulls if other is not hull]
         union.append(points[~np.any(buried, axis=0)] if buried else points)
     surface = np.vstack(union)

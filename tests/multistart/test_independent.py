@@ -45,11 +45,15 @@ def test_the_other_optimiser_climbs_to_grasps(planar: RandomClimbs) -> None:
     assert end[1] > 1.1 * planar.index(start[None])[0]
 
 
+@pytest.fixture(scope="module")
+def round_the_can(can: ga.Problem) -> ga.Result:
+    return ga.optimize(can, motions="all")
+
+
 @pytest.mark.slow
-def test_no_other_climb_round_the_can_is_better() -> None:
-    problem = ga.load_problem("schunk_can")
-    climbs = RandomClimbs(problem, "manipulability_volume", problem.requirements)
-    best = best_value(problem)
+def test_no_other_climb_round_the_can_is_better(can: ga.Problem, round_the_can: ga.Result) -> None:
+    climbs = RandomClimbs(can, "manipulability_volume", can.requirements)
+    best = round_the_can.refined_best.quality
     found = values(climbs, range(24), draws=12)
     assert len(found) > 8
     assert found.max() <= (1.0 + SHARE) * best
@@ -57,18 +61,17 @@ def test_no_other_climb_round_the_can_is_better() -> None:
 
 
 @pytest.mark.slow
-def test_no_other_climb_from_the_maxima_round_the_can_is_better() -> None:
-    problem = ga.load_problem("schunk_can")
-    climbs = RandomClimbs(problem, "manipulability_volume", problem.requirements)
-    refinement = ga.optimize(problem, motions="all").refinement
+def test_no_other_climb_from_the_maxima_round_the_can_is_better(can: ga.Problem, round_the_can: ga.Result) -> None:
+    climbs = RandomClimbs(can, "manipulability_volume", can.requirements)
+    refinement = round_the_can.refinement
     assert refinement is not None
     random = np.random.default_rng(0)
     found = []
-    for x in refinement.x[:4]:
+    for x in refinement.x[:2]:
         for length in (0.0, 0.1, 0.5):
             v = random.normal(size=climbs.system.tangent_size)
             near = climbs.system.integrate(x, length * v / np.linalg.norm(v))
             end = climbs.climb(climbs.repair(climbs.touching(near)))
             found += [] if end is None else [end[1]]
-    assert len(found) > 6
+    assert len(found) > 3
     assert max(found) == pytest.approx(refinement.qualities[0], rel=SHARE)

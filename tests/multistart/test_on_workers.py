@@ -17,11 +17,13 @@ import numpy as np
 import pytest
 
 import graspatlas as ga
+from graspatlas.cluster.sealing import opened
 from graspatlas.multistart import on_workers
 from graspatlas.multistart.on_workers import OnWorkers, sealed
 from graspatlas.multistart.rounds import Plan, Round
 from graspatlas.multistart.search import Search, one_by_one
 from graspatlas.result.refinement import Refinement, SearchEnd
+from graspatlas.version import __version__
 
 # Dask's own start and end on a busy machine.
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -81,11 +83,11 @@ def test_a_plan_comes_out_as_it_was_packed(problem: ga.Problem) -> None:
     requirements = (ga.ForceClosure(1.0 / 3.0, 0.1), ga.CollisionFree(1.0 / 7000.0))
     plan = plan_of(problem, requirements=requirements)
     assert plan.objective.requirements == requirements
-    opened = on_workers._opened(sealed(plan))
-    assert opened.requirements == requirements
-    assert opened.threads == 1
-    assert opened.problem.to_dict() == problem.to_dict()
-    assert on_workers._opened(sealed(plan)).objective is opened.objective, "it is read once"
+    there = opened(__version__, sealed(plan))
+    assert there.requirements == requirements
+    assert there.threads == 1
+    assert there.problem.to_dict() == problem.to_dict()
+    assert opened(__version__, sealed(plan)).objective is there.objective, "it is read once"
 
 
 def test_rounds_of_a_checkpoint_are_not_done_again(
@@ -162,7 +164,7 @@ def test_an_index_that_fails_says_so_itself(problem: ga.Problem, address: str) -
 
 def test_another_version_on_a_worker_is_refused(problem: ga.Problem) -> None:
     with pytest.raises(ga.GraspAtlasError, match=r"this process 0\.0\.1: install the same"):
-        on_workers._round_on_worker("0.0.1", sealed(plan_of(problem)), 1, None)
+        opened("0.0.1", sealed(plan_of(problem)))
 
 
 def test_the_limit_of_time_cuts_it_short(problem: ga.Problem, address: str) -> None:

@@ -12,7 +12,7 @@ import pytest
 import graspatlas as ga
 from graspatlas.analysis.densify import densify
 from graspatlas.cli import main
-from graspatlas.commands.report import result_lines
+from graspatlas.commands.shared.report import result_lines
 from graspatlas.result.gap import Gap, estimate_gap
 
 HOLDS = (ga.ForceClosure(0.5, 0.02), ga.CollisionFree())

@@ -15,7 +15,7 @@ from screens import browse, pixels, share
 
 import graspatlas as ga
 from graspatlas.viewer import export_html, save_picture, view
-from graspatlas.viewer.scene.path_film import path_film
+from graspatlas.viewer.films.path_film import path_film
 from graspatlas.viewer.web.animation_page import film_animation
 from graspatlas.viewer.web.browser import close
 

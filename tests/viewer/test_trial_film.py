@@ -16,7 +16,7 @@ from screens import browse, pixels, share
 
 import graspatlas as ga
 from graspatlas.simulation.protocols import PROTOCOLS
-from graspatlas.viewer.scene.trial_film import moments, trial_film, trial_strips
+from graspatlas.viewer.films.trial_film import moments, trial_film, trial_strips
 from graspatlas.viewer.web.animation_page import film_animation
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from graspatlas.analysis.densify import Samples, densify
 from graspatlas.analysis.pareto import knee, pareto_front, values_of
-from graspatlas.commands.arguments import FAILED, INTERRUPTED, Subcommands, chart_named, path_word
+from graspatlas.commands.shared.arguments import FAILED, INTERRUPTED, Subcommands, chart_named, path_word
 from graspatlas.errors import GraspAtlasError
 from graspatlas.paths.path import GraspPath
 from graspatlas.paths.shortest_path import shortest_path

@@ -7,7 +7,7 @@ import json
 import sys
 
 from graspatlas.analysis.climb import MAX_STEPS
-from graspatlas.commands.arguments import FAILED, INTERRUPTED, Subcommands, path_word
+from graspatlas.commands.shared.arguments import FAILED, INTERRUPTED, Subcommands, path_word
 from graspatlas.errors import GraspAtlasError
 from graspatlas.optimizer.ladder import CHARTS, MAX_SECONDS, ladder
 from graspatlas.optimizer.ladder_outcome import Ladder, LadderStatus

@@ -8,7 +8,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from graspatlas.commands.arguments import Subcommands, path_word
+from graspatlas.commands.shared.arguments import Subcommands, path_word
 from graspatlas.problem_files.outline import read_outline
 from graspatlas.problems import bundled_problems, problem_text
 from graspatlas.quality.evaluation import INDICES

@@ -10,8 +10,8 @@ from pathlib import Path
 from graspatlas.analysis.climb import MAX_STEPS
 from graspatlas.atlas.checkpoints import CheckpointFolder
 from graspatlas.atlas.status import Status
-from graspatlas.commands.arguments import FAILED, INTERRUPTED, Subcommands, path_word
-from graspatlas.commands.report import component_lines, result_lines
+from graspatlas.commands.shared.arguments import FAILED, INTERRUPTED, Subcommands, path_word
+from graspatlas.commands.shared.report import component_lines, result_lines
 from graspatlas.errors import GraspAtlasError
 from graspatlas.multistart.checkpoint import RoundFolder
 from graspatlas.multistart.search import SHARE

@@ -7,8 +7,8 @@ import json
 import os
 from pathlib import Path
 
-from graspatlas.commands.arguments import Subcommands, path_word
 from graspatlas.commands.diagnosis import OK, PROBLEM, Finding, diagnose, report, with_first_grasp_for
+from graspatlas.commands.shared.arguments import Subcommands, path_word
 from graspatlas.errors import GraspAtlasError
 from graspatlas.problem.problem import Problem
 from graspatlas.problems import bundled_problems, load_problem, problem_text

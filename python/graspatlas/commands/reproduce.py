@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from graspatlas.commands.arguments import Subcommands, path_word
+from graspatlas.commands.shared.arguments import Subcommands, path_word
 from graspatlas.support.terminal import say
 
 __all__ = ["add_commands"]

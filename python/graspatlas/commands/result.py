@@ -6,7 +6,7 @@ import argparse
 import json
 import sys
 
-from graspatlas.commands.arguments import FAILED, Subcommands, chart_named, path_word
+from graspatlas.commands.shared.arguments import FAILED, Subcommands, chart_named, path_word
 from graspatlas.errors import GraspAtlasError
 from graspatlas.execution.pregrasp import DISTANCE
 from graspatlas.formats.export import FORMATS, export_grasps

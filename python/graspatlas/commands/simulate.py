@@ -9,7 +9,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from graspatlas.commands.arguments import FAILED, INTERRUPTED, Subcommands, chart_named, path_word
+from graspatlas.commands.shared.arguments import FAILED, INTERRUPTED, Subcommands, chart_named, path_word
 from graspatlas.errors import GraspAtlasError
 from graspatlas.result.result import Result, load_result
 from graspatlas.simulation.outcome import Simulation

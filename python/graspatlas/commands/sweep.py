@@ -6,7 +6,7 @@ import argparse
 import json
 import sys
 
-from graspatlas.commands.arguments import FAILED, INTERRUPTED, Subcommands, path_word
+from graspatlas.commands.shared.arguments import FAILED, INTERRUPTED, Subcommands, path_word
 from graspatlas.support.terminal import say
 
 __all__ = ["add_commands"]

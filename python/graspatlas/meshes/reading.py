@@ -49,6 +49,7 @@ def read_mesh(mesh: AnyMesh) -> tuple[Array, IntArray]:
             finite corners.
     """
     trimesh = trimesh_library()
+    name = f"mesh '{mesh}'" if isinstance(mesh, str | Path) else "the mesh"
     if isinstance(mesh, str | Path):
         path = Path(mesh)
         if not is_file(path):
@@ -61,9 +62,9 @@ def read_mesh(mesh: AnyMesh) -> tuple[Array, IntArray]:
         raise GraspAtlasError(f"mesh must be a file with one mesh or a trimesh.Trimesh, got {type(mesh).__name__}")
     vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)
     if len(faces) == 0:
-        raise GraspAtlasError("the mesh has no faces, or vertices that are not finite")
+        raise GraspAtlasError(f"{name} has no faces, or vertices that are not finite; look at it in a mesh viewer")
     if len(faces) > MOST_FACES:
-        raise GraspAtlasError(f"the mesh has {len(faces)} faces, at most {MOST_FACES} are taken: simplify it first")
+        raise GraspAtlasError(f"{name} has {len(faces)} faces, at most {MOST_FACES} are taken: simplify it first")
     if not (np.abs(vertices[faces.ravel()]) < LARGEST).all():
-        raise GraspAtlasError("the mesh has no faces, or vertices that are not finite")
+        raise GraspAtlasError(f"{name} has no faces, or vertices that are not finite; look at it in a mesh viewer")
     return vertices, faces

@@ -6,38 +6,20 @@ of them die on the way.
 
 from __future__ import annotations
 
-import pickle
 from collections.abc import Generator
-from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from dataclasses import replace
 
-from graspatlas.cluster.client import connected
-from graspatlas.cluster.numbered_tasks import NumberedTasks
-from graspatlas.errors import GraspAtlasError
+from graspatlas.cluster import sealing
+from graspatlas.cluster.workers import Workers
 from graspatlas.multistart.rounds import Plan, Round, run_round
 from graspatlas.multistart.search import MOST_ROUNDS
-from graspatlas.quality.batched import quality_name
-from graspatlas.requirements.base import requirement_name
-from graspatlas.support.machine import available_threads
-from graspatlas.version import __version__
+from graspatlas.requirements.base import users_functions
 
 __all__ = ["OnWorkers", "sealed"]
 
-#: Plans that a worker keeps, with what it has read and computed for them.
-KEPT_PLANS = 2
 
-
-@dataclass(frozen=True)
-class OnWorkers:
-    """Where rounds are done; a :data:`graspatlas.multistart.search.Source`.
-
-    Attributes:
-        workers: Processes on this machine, all cores by default; they end with the search.
-        scheduler: Address of a scheduler whose workers are used instead.
-    """
-
-    workers: int | None = None
-    scheduler: str | None = None
+class OnWorkers(Workers):
+    """Where rounds are done; a :data:`graspatlas.multistart.search.Source`."""
 
     def __call__(self, plan: Plan, first: int, deadline: float) -> Generator[Round, None, None]:
         """The rounds from a number on; those that have not ended when the deadline passes are none.
@@ -46,44 +28,18 @@ class OnWorkers:
             GraspAtlasError: If the plan holds a function that cannot be pickled, there is no scheduler, or a round
                 fails.
         """
-        function = partial(_round_on_worker, __version__, sealed(plan))
-        with connected(self.scheduler, self.workers or available_threads()) as client:
-            tasks: NumberedTasks[Round] = NumberedTasks(client, function, "round")
-            yield from tasks.results(range(first, MOST_ROUNDS + 1), deadline)
+        yield from self.results(_round, sealed(plan), "round", range(first, MOST_ROUNDS + 1), deadline)
 
 
 def sealed(plan: Plan) -> bytes:
-    """A plan for other processes: what it is made of, and functions of the user by cloudpickle.
+    """A plan for other processes, in which a round takes one thread: a worker has others for other rounds.
 
     Raises:
         GraspAtlasError: If a function cannot be pickled.
     """
-    import cloudpickle
-
-    parts: dict[str, object] = {f"the index {quality_name(plan.quality)}": plan.quality}
-    parts.update({f"the requirement {requirement_name(each)}": each for each in plan.requirements})
-    for name, part in parts.items():
-        try:
-            cloudpickle.dumps(part)
-        except Exception as error:
-            raise GraspAtlasError(
-                f"{name} cannot be sent to workers ({type(error).__name__}: {error}): let it hold plain data alone, "
-                "and open what it needs when it is called; or search without workers"
-            ) from None
-    return bytes(cloudpickle.dumps(plan))
+    functions = users_functions(plan.quality, plan.requirements)
+    return sealing.sealed(replace(plan, threads=1), functions, "search without workers")
 
 
-def _round_on_worker(version: str, plan: bytes, number: int, max_seconds: float | None) -> Round:
-    """A round; a worker has many threads where it is to do many at a time, so each takes one."""
-    if version != __version__:
-        raise GraspAtlasError(
-            f"a worker has graspatlas {__version__} and this process {version}: install the same version on both"
-        )
-    return run_round(_opened(plan), number, max_seconds)
-
-
-@lru_cache(maxsize=KEPT_PLANS)
-def _opened(plan: bytes) -> Plan:
-    """The plan, which keeps its objective from round to round: to read a hand and its meshes takes long."""
-    opened: Plan = pickle.loads(plan)
-    return replace(opened, threads=1)
+def _round(plan: Plan, number: int, max_seconds: float | None) -> Round:
+    return run_round(plan, number, max_seconds)

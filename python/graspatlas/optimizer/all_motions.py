@@ -10,7 +10,7 @@ import numpy as np
 
 from graspatlas.analysis.objective import Objective
 from graspatlas.analysis.peaks import local_maxima
-from graspatlas.cluster.client import need
+from graspatlas.cluster.workers import check_workers
 from graspatlas.errors import GraspAtlasError
 from graspatlas.multistart.on_workers import OnWorkers
 from graspatlas.multistart.rounds import Plan
@@ -21,12 +21,10 @@ from graspatlas.result.result import Result
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import checked_instance, number, shown, whole
 
-__all__ = ["check_motions", "check_workers", "slice_dimension", "with_best_of_all"]
+__all__ = ["check_motions", "check_sharing", "slice_dimension", "with_best_of_all"]
 
 #: Dimension of the atlas where the problem has no default.
 DIMENSION = 2
-#: Most workers that are started on this machine.
-MOST_WORKERS = 1024
 #: Charts from which to climb, the best first.
 MOST_STARTS = 40
 
@@ -53,7 +51,7 @@ def check_motions(motions: object, dimension: int | None, refine: bool | str, sh
         raise GraspAtlasError("motions 'all' climbs in all of F already: leave refine out")
 
 
-def check_workers(motions: str, workers: int | None, scheduler: str | None) -> None:
+def check_sharing(motions: str, workers: int | None, scheduler: str | None) -> None:
     """Make sure that what is asked to do the rounds of a search can.
 
     Raises:
@@ -66,13 +64,7 @@ def check_workers(motions: str, workers: int | None, scheduler: str | None) -> N
             "workers and a scheduler share the search over all hand motions: add motions='all', or leave them out; for "
             "many problems or options see graspatlas sweep"
         )
-    if workers is not None and scheduler is not None:
-        raise GraspAtlasError("give workers of this machine or the address of a scheduler, not both")
-    if workers is not None:
-        whole(workers, "workers", most=MOST_WORKERS)
-    elif not isinstance(scheduler, str) or not scheduler:
-        raise GraspAtlasError(f"scheduler must be an address such as 'tcp://10.0.0.1:8786', got {shown(scheduler)}")
-    need("a search on workers", "dask.distributed")
+    check_workers("a search on workers", workers, scheduler)
 
 
 def slice_dimension(problem: Problem) -> int:

@@ -41,6 +41,8 @@ FIRST_STEP = 0.1
 INDEX = "inverse_condition_number"
 #: Time that climbs are given where none is left [s].
 SHORTEST = 1e-3
+#: Time that the search for any feasible grasp is given where none is left [s].
+LAST_SEARCH = 1.0
 #: Longest search without each of the couplings that may leave no grasp [s].
 WITHOUT_SECONDS = 2.0
 
@@ -83,7 +85,7 @@ def with_good_first_grasp(
                 reached += [k] if search.found else []
     k = dimension if dimension in reached else dimensions[-1]
     try:
-        found = with_first_grasp(problem, k, seconds_until(deadline, SHORTEST), progress)
+        found = with_first_grasp(problem, k, seconds_until(deadline, LAST_SEARCH), progress)
         return found if k == dimension else problem.at(found.x1_array)
     except GraspAtlasError as error:
         blocking = _couplings_that_leave_none(problem)

@@ -16,7 +16,7 @@ from graspatlas.atlas.build import grown
 from graspatlas.atlas.limits import LimitOptions, Limits
 from graspatlas.errors import GraspAtlasError
 from graspatlas.multistart.search import SHARE
-from graspatlas.optimizer.all_motions import check_motions, check_workers, slice_dimension, with_best_of_all
+from graspatlas.optimizer.all_motions import check_motions, check_sharing, slice_dimension, with_best_of_all
 from graspatlas.optimizer.first_grasp import with_good_first_grasp
 from graspatlas.optimizer.options import several_indices, with_defaults
 from graspatlas.optimizer.readings import Reading, check_atlas_of
@@ -106,7 +106,7 @@ def optimize(
     """
     limit = Limits.of(limits, "optimize")
     check_motions(motions, dimension, refine, share_missing, seed)
-    check_workers(motions, workers, scheduler)
+    check_sharing(motions, workers, scheduler)
     if motions == "all":
         dimension = slice_dimension(problem)
     options = with_defaults(problem, dimension=dimension, radius=radius, epsilon=epsilon, quality=quality)

@@ -24,10 +24,10 @@ _HEAD = """\
 """
 
 
-def folder_name(rank: int, name: str) -> str:
-    """Name of the folder of a proposal, which sorts by rank and says what touches what."""
-    words = re.sub(r"[^A-Za-z0-9]+", "_", name.replace(" on ", "-")).strip("_")
-    return f"{rank:02}_{words}"[:80]
+def folder_name(number: int, name: str) -> str:
+    """Name of the folder of an assignment, the same in every search: its number, and what touches what."""
+    words = re.sub(r"[^A-Za-z0-9-]+", "_", name.replace(" on ", "-")).strip("_")
+    return f"{number:05}_{words}"[:80]
 
 
 def problem_file(plan: Plan, problem: Problem, locked: Mapping[str, float], folder: str) -> str:
@@ -62,19 +62,19 @@ def problem_file(plan: Plan, problem: Problem, locked: Mapping[str, float], fold
         }
     lines = [_HEAD.format(name=" ".join(problem.name.split()))]
     for key, value in table.items():
-        lines.append(f"{key}: {_value(value)}")
+        lines.append(f"{key}:{_value(value)}")
     text = "\n".join(lines) + "\n"
     return text if problem.x1 is None else with_x1(text, problem.x1)
 
 
 def _value(value: object, indent: int = 2) -> str:
-    """A value in YAML: tables and lists of tables line by line, all else in JSON, which YAML holds."""
+    """What follows a key in YAML: tables and lists of tables line by line, all else in JSON, which YAML holds."""
     space = " " * indent
     if isinstance(value, dict) and value:
-        return "\n" + "\n".join(f"{space}{json.dumps(str(k))}: {_value(v, indent + 2)}" for k, v in value.items())
+        return "\n" + "\n".join(f"{space}{json.dumps(str(k))}:{_value(v, indent + 2)}" for k, v in value.items())
     if isinstance(value, list) and value and all(isinstance(each, dict) for each in value):
         return "\n" + "\n".join(f"{space}- {json.dumps(_plain(each))}" for each in value)
-    return json.dumps(_plain(value))
+    return " " + json.dumps(_plain(value))
 
 
 def _plain(value: object) -> Any:

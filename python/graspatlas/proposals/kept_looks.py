@@ -7,7 +7,8 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from graspatlas.proposals.matching import Assignment
+from graspatlas.problem.requirement import StatedRequirement
+from graspatlas.proposals.assignments.matching import Assignment
 from graspatlas.proposals.plan import Plan
 from graspatlas.proposals.trial import Look, LookEnd
 from graspatlas.quality.batched import quality_name
@@ -24,6 +25,9 @@ _KINDS = {"end": "U", "why": "U", "value": "f", "x": "f", "postures": "f"}
 class KeptLooks:
     """A folder with a file for each look.
 
+    Where the index or a requirement is a function of the user's, nothing is kept: another function of the same name
+    could not be told from it.
+
     Args:
         folder: The folder.
         plan: What the looks belong to.
@@ -35,13 +39,15 @@ class KeptLooks:
         stated = [
             VERSION,
             dict(plan.source),
-            plan.body.to_dict(),
+            plan.surface,
             quality_name(plan.quality),
             [requirement_name(requirement) for requirement in plan.requirements],
             plan.length_scale,
             plan.seed,
             [(each.name, each.score, each.fingers.hand.urdf) for each in assignments],
         ]
+        stated_all = all(isinstance(requirement, StatedRequirement) for requirement in plan.requirements)
+        self._keeps = isinstance(plan.quality, str) and stated_all
         self._digest = hashlib.sha256(json.dumps(stated, sort_keys=True, default=str).encode()).hexdigest()
 
     def look(self, number: int) -> Look | None:
@@ -51,7 +57,7 @@ class KeptLooks:
             GraspAtlasError: If its file is damaged, or belongs to another hand, mesh or other arguments.
         """
         path = self._path(number)
-        if not path.exists():
+        if not self._keeps or not path.exists():
             return None
         part = read_run_file(path, self._digest)
         if set(part) != set(_KINDS) or any(array.dtype.kind != _KINDS[name] for name, array in part.items()):
@@ -64,6 +70,8 @@ class KeptLooks:
         Raises:
             GraspAtlasError: If its file cannot be written.
         """
+        if not self._keeps:
+            return look
         values = {"end": str(look.end), "why": look.why, "value": look.value, "x": look.x, "postures": look.postures}
         write_run_file(self._path(number), self._digest, values)
         return look

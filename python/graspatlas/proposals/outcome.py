@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from graspatlas.proposals.matching import Counts
+from graspatlas.proposals.assignments.matching import Counts
 from graspatlas.proposals.trial import LookEnd
+from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.result.result import Result
 from graspatlas.storage.files import write_csv
+from graspatlas.support.validation import PlainTable
 from graspatlas.support.words import Word
 
-__all__ = ["Proposal", "Proposals", "ProposalsEnd", "Tried"]
+__all__ = ["COLUMNS", "Proposal", "Proposals", "ProposalsEnd", "Tried"]
+
+#: Columns of the table: which link on which region, how promising it was, what came of a first look, the requirement
+#: that was missed, the index of the best grasp of the look and after the atlas, its charts, those that meet the
+#: requirements, and the folder.
+COLUMNS = ("assignment", "distance", "end", "missed", "first_value", "value", "charts", "accepted", "folder")
 
 
 class ProposalsEnd(Word):
@@ -42,6 +50,11 @@ class Tried:
     end: LookEnd
     value: float
     why: str
+
+    @property
+    def reason(self) -> str:
+        """What came of it, and the requirement that was missed."""
+        return f"{self.end}: {self.why}" if self.why else str(self.end)
 
     @property
     def name(self) -> str:
@@ -76,6 +89,7 @@ class Proposals:
 
     Attributes:
         proposals: The proposals.
+        quality: The index that ranks them.
         tried: All assignments that were looked at, in the order of promise.
         counts: How many assignments there are, and why some were left out.
         status: Why the search ended.
@@ -84,6 +98,7 @@ class Proposals:
     """
 
     proposals: tuple[Proposal, ...]
+    quality: Quality
     tried: tuple[Tried, ...]
     counts: Counts
     status: ProposalsEnd
@@ -91,29 +106,39 @@ class Proposals:
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        best = f", the best {self.proposals[0].quality:.4g}" if self.proposals else ""
-        return f"<Proposals: {len(self.proposals)} of {len(self.tried)} assignments tried{best}; {self.status}>"
+        return f"<Proposals: {self.summary()}>"
+
+    def summary(self) -> str:
+        """How many there are of how many that were looked at, the best, what refused the others, and why it ended."""
+        best = f", the best of {quality_name(self.quality)} {self.proposals[0].quality:.4g}" if self.proposals else ""
+        met = sum(each.end is LookEnd.MET for each in self.tried)
+        looked = f"{len(self.tried)} of {self.counts.left} assignments looked at, {met} with grasps as required"
+        return f"{len(self.proposals)} proposed{best}; {looked}; {self.status}, {self.seconds:.1f} s"
+
+    def refusals(self) -> dict[str, int]:
+        """What came of the assignments without a grasp that meets the requirements, the most frequent first."""
+        ends = Counter(each.reason for each in self.tried if each.end is not LookEnd.MET)
+        return dict(ends.most_common())
 
     def rows(self) -> list[dict[str, Any]]:
         """A table with a row for each assignment that was looked at."""
-        folders = {id(each.tried): each for each in self.proposals}
-        rows = []
-        for tried in self.tried:
-            proposal = folders.get(id(tried))
-            rows.append(
-                {
-                    "assignment": tried.name,
-                    "score": tried.score,
-                    "end": str(tried.end),
-                    "missed": tried.why,
-                    "first_value": tried.value,
-                    "value": proposal.quality if proposal else None,
-                    "charts": proposal.result.atlas.n_charts if proposal else None,
-                    "accepted": int(proposal.result.accepted.sum()) if proposal else None,
-                    "folder": proposal.folder.name if proposal else None,
-                }
-            )
-        return rows
+        proposed = {id(each.tried): each for each in self.proposals}
+        return [_row(each, proposed.get(id(each))) for each in self.tried]
+
+    def to_dict(self) -> PlainTable:
+        """The figures as plain data, without the results."""
+        return {
+            "status": str(self.status),
+            "seconds": self.seconds,
+            "quality": quality_name(self.quality),
+            "assignments": {"all": self.counts.all, "left": self.counts.left, "looked_at": len(self.tried)},
+            "notes": list(self.notes),
+            "refusals": dict(self.refusals()),
+            "proposals": [
+                {"quality": each.quality, "assignment": each.tried.name, "folder": str(each.folder)}
+                for each in self.proposals
+            ],
+        }
 
     def save_table(self, path: str | Path) -> None:
         """Write the table as CSV.
@@ -125,5 +150,21 @@ class Proposals:
             GraspAtlasError: If it cannot be written.
         """
         rows = self.rows()
-        names = list(rows[0]) if rows else ["assignment"]
-        write_csv(path, {name: [row[name] for row in rows] for name in names})
+        write_csv(path, {name: [row[name] for row in rows] for name in COLUMNS})
+
+
+def _row(tried: Tried, proposal: Proposal | None) -> dict[str, Any]:
+    """What the table says of an assignment; see :data:`COLUMNS`."""
+    met = tried.end is LookEnd.MET
+    row: dict[str, Any] = {
+        "assignment": tried.name,
+        "distance": tried.score,
+        "end": str(tried.end),
+        "missed": tried.why,
+        "first_value": tried.value if met else float("nan"),
+    }
+    if proposal is None:
+        return row | {"value": float("nan"), "charts": "", "accepted": "", "folder": ""}
+    result = proposal.result
+    counts = {"charts": result.atlas.n_charts, "accepted": int(result.accepted.sum())}
+    return row | {"value": proposal.quality, **counts, "folder": proposal.folder.name}

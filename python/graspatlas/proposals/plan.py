@@ -18,8 +18,10 @@ class Plan(Light):
     """What all assignments of one hand and one object have in common.
 
     Attributes:
+        hand: Name of the hand.
         source: How a problem file names the hand: ``{"urdf": path}`` and so on.
         body: The object.
+        surface: SHA-256 of its surface.
         quality: The index that ranks proposals.
         requirements: What grasps must meet.
         radius: r, of the charts of the atlases.
@@ -27,8 +29,10 @@ class Plan(Light):
         seed: Of the random numbers.
     """
 
+    hand: str
     source: Mapping[str, str]
     body: Body
+    surface: str
     quality: Quality
     requirements: tuple[RequirementLike, ...]
     radius: float = 0.3

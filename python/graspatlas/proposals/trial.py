@@ -19,8 +19,8 @@ from graspatlas.optimizer.optimize import optimize
 from graspatlas.problem.contacts import Contact
 from graspatlas.problem.problem import Problem
 from graspatlas.problem.requirement import StatedRequirement
-from graspatlas.proposals.fingers import touched
-from graspatlas.proposals.matching import Assignment
+from graspatlas.proposals.assignments.fingers import touched
+from graspatlas.proposals.assignments.matching import Assignment
 from graspatlas.proposals.pinning import pinned
 from graspatlas.proposals.plan import Plan
 from graspatlas.quality.batched import quality_name
@@ -79,7 +79,7 @@ def problem_of(plan: Plan, assignment: Assignment) -> Problem:
         contacts.append(Contact(pad.frame, touched(pad), patch))
     stated = tuple(each for each in plan.requirements if isinstance(each, StatedRequirement))
     return Problem(
-        name=assignment.name,
+        name=f"{plan.body.name} by {plan.hand}",
         hand=assignment.fingers.hand,
         object=plan.body,
         contacts=tuple(contacts),

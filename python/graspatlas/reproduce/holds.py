@@ -24,8 +24,8 @@ from graspatlas.simulation.trials import GROWTH
 from graspatlas.support.arrays import Array
 from graspatlas.support.mujoco_library import mujoco_library
 from graspatlas.viewer.figures.style import Picture
+from graspatlas.viewer.films.trial_film import trial_strips
 from graspatlas.viewer.render.film_strip import draw_rows
-from graspatlas.viewer.scene.trial_film import trial_strips
 
 __all__ = ["holds"]
 

@@ -20,10 +20,19 @@ from graspatlas.grasps.grasp import Grasp
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.problem.problem import Problem
 from graspatlas.problem.requirement import StatedRequirement
+from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.support.validation import shown
 
-__all__ = ["Requirement", "RequirementLike", "Slacks", "asked", "requirement_measures", "requirement_name"]
+__all__ = [
+    "Requirement",
+    "RequirementLike",
+    "Slacks",
+    "asked",
+    "requirement_measures",
+    "requirement_name",
+    "users_functions",
+]
 
 Slacks = Callable[[Grasps], Array]
 
@@ -84,6 +93,13 @@ def requirement_name(requirement: RequirementLike | str) -> str:
     if isinstance(requirement, StatedRequirement | str):
         return str(requirement)
     return getattr(requirement, "__name__", type(requirement).__name__)
+
+
+def users_functions(quality: Quality, requirements: Sequence[RequirementLike]) -> dict[str, object]:
+    """What a user may have written of an index and requirements, by what messages call it."""
+    functions: dict[str, object] = {f"the index {quality_name(quality)}": quality}
+    functions.update({f"the requirement {requirement_name(each)}": each for each in requirements})
+    return functions
 
 
 def asked(requirement: RequirementLike, grasps: Grasps) -> BoolArray:

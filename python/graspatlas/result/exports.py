@@ -28,7 +28,7 @@ from graspatlas.support.arrays import AnyArray, Array, BoolArray, IntArray
 from graspatlas.support.validation import PlainTable, whole
 from graspatlas.version import __version__
 
-__all__ = ["ENDINGS", "FORMAT", "FORMAT_VERSION", "Selection", "save_grasps", "select"]
+__all__ = ["ENDINGS", "FORMAT", "FORMAT_VERSION", "Selection", "identity", "save_grasps", "select"]
 
 
 #: What a file of grasps may end in.
@@ -183,8 +183,8 @@ def save_grasps(
     return len(selection.grasps)
 
 
-def _header(result: GraspAtlas, selection: Selection) -> PlainTable:
-    """What holds for all grasps of a file."""
+def identity(result: GraspAtlas) -> PlainTable:
+    """What stands at the top of every file of grasps: format, problem, hand, object, their frames and the index."""
     problem = result.problem
     return {
         "format": FORMAT,
@@ -194,6 +194,14 @@ def _header(result: GraspAtlas, selection: Selection) -> PlainTable:
         "hand": problem.hand.name,
         "object": problem.object.name,
         "frames": {"palm": root_link(problem.hand.urdf), "object": root_link(problem.object.urdf)},
+        "quality": quality_name(result.quality),
+    }
+
+
+def _header(result: GraspAtlas, selection: Selection) -> PlainTable:
+    """What holds for all grasps of a file."""
+    problem = result.problem
+    return identity(result) | {
         "units": {
             "xyz": "m",
             "point": "m",
@@ -201,7 +209,6 @@ def _header(result: GraspAtlas, selection: Selection) -> PlainTable:
             **({} if selection.pregrasps is None else {"distance": "m"}),
             "joints": {joint.name: "m" if joint.prismatic else "rad" for joint in problem.hand.model.hand_joints},
         },
-        "quality": quality_name(result.quality),
         "requirements": [requirement_name(requirement) for requirement in result.requirements],
         "status": str(result.status),
         "n_charts": result.atlas.n_charts,

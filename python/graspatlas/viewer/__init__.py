@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from graspatlas.hand.hand import Hand
     from graspatlas.pads.pad import Pad
     from graspatlas.problem.problem import Problem
-    from graspatlas.viewer.scene.animation import Film
+    from graspatlas.viewer.films.animation import Film
     from graspatlas.viewer.scene.marks import Marked
     from graspatlas.viewer.scene.scene import Scene
 
@@ -110,11 +110,11 @@ def save_picture(
         GraspAtlasError: If the size is too small, a mesh cannot be read or the file cannot be written.
     """
     from graspatlas.storage.files import replaced
+    from graspatlas.viewer.films.path_film import path_film
+    from graspatlas.viewer.films.trial_film import trial_strips
     from graspatlas.viewer.render.film_strip import FRAMES, draw_rows, draw_strip
     from graspatlas.viewer.render.picture import check_size, draw
-    from graspatlas.viewer.scene.path_film import path_film
     from graspatlas.viewer.scene.scene import Scene
-    from graspatlas.viewer.scene.trial_film import trial_strips
 
     _check_png(path)
     check_size(width, height)
@@ -190,8 +190,8 @@ def _check_png(path: str | os.PathLike[str]) -> None:
 
 
 def _film(shown: Path | list[Recording]) -> Film:
-    from graspatlas.viewer.scene.path_film import path_film
-    from graspatlas.viewer.scene.trial_film import trial_film
+    from graspatlas.viewer.films.path_film import path_film
+    from graspatlas.viewer.films.trial_film import trial_film
 
     return path_film(shown) if isinstance(shown, Path) else trial_film(shown)
 

@@ -14,14 +14,10 @@ from string import Template
 
 import numpy as np
 
-from graspatlas.hand.urdf import root_link
-from graspatlas.problem.problem import Problem
-from graspatlas.quality.batched import quality_name
-from graspatlas.result.exports import FORMAT, FORMAT_VERSION
+from graspatlas.result.exports import identity
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import PlainTable
-from graspatlas.version import __version__
 from graspatlas.viewer.explorer.charts import Charts
 from graspatlas.viewer.explorer.layout import write_layout
 from graspatlas.viewer.explorer.numbers import Numbers
@@ -97,7 +93,7 @@ def explorer_page(result: GraspAtlas, chart: int | None = None) -> str:
 
 def _extremes(result: GraspAtlas) -> str:
     """Values of the best and the worst grasp, in words."""
-    grasps = [("best", result.refined_best)] if result.refinement else []
+    grasps = [("refined best", result.refined_best)] if result.refinement else []
     if result.accepted.any():
         grasps += [] if grasps else [("best", result.best)]
         grasps.append(("worst", result.worst))
@@ -150,7 +146,7 @@ def _facts(result: GraspAtlas, numbers: Numbers) -> PlainTable:
         "view": _view(result, shapes),
         "colours": {name: list(colour) for name, colour in COLOURS.items()},
         "legend": [{"colour": list(colour), "text": text} for colour, text in legend()],
-        "file": _file_header(problem, result),
+        "file": identity(result),
     }
 
 
@@ -184,18 +180,4 @@ def _view(result: GraspAtlas, shapes: BodyShapes) -> PlainTable:
         "contact_radius": size * CONTACT_RADIUS,
         "normal": [size * NORMAL_LENGTH, size * NORMAL_RADIUS],
         "ellipsoid": [size * ELLIPSOID_LENGTH, size * ELLIPSOID_THICKNESS],
-    }
-
-
-def _file_header(problem: Problem, result: GraspAtlas) -> PlainTable:
-    """What stands at the top of a grasp that is copied, as in the files of ``save_grasps``."""
-    return {
-        "format": FORMAT,
-        "version": FORMAT_VERSION,
-        "graspatlas": __version__,
-        "problem": problem.name,
-        "hand": problem.hand.name,
-        "object": problem.object.name,
-        "frames": {"palm": root_link(problem.hand.urdf), "object": root_link(problem.object.urdf)},
-        "quality": quality_name(result.quality),
     }

@@ -9,9 +9,9 @@ import numpy as np
 from PIL import Image
 
 from graspatlas.support.progress import counted
+from graspatlas.viewer.films.animation import Film, Readout
 from graspatlas.viewer.render.picture import painted
 from graspatlas.viewer.render.text_images import DARK, GREY, legend_image, text_image
-from graspatlas.viewer.scene.animation import Film, Readout
 from graspatlas.viewer.scene.camera import Camera
 from graspatlas.viewer.scene.scene import fitted_camera
 

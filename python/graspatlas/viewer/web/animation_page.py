@@ -13,8 +13,8 @@ import numpy as np
 
 from graspatlas.numerics.rotations import quaternions_from_matrices
 from graspatlas.support.validation import PlainTable
+from graspatlas.viewer.films.animation import Film
 from graspatlas.viewer.render.text_images import DARK, GREY, text_image
-from graspatlas.viewer.scene.animation import Film
 from graspatlas.viewer.scene.camera import Camera
 from graspatlas.viewer.scene.scene import SHOW_THROUGH
 from graspatlas.viewer.web.page import (

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from graspatlas.result.result import Result
 from graspatlas.support.terminal import say
-from graspatlas.viewer.scene.animation import Film
+from graspatlas.viewer.films.animation import Film
 from graspatlas.viewer.scene.scene import Scene
 from graspatlas.viewer.web.animation_page import film_animation, film_caption, film_commands
 from graspatlas.viewer.web.page import Command, commands

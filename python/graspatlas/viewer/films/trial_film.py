@@ -9,7 +9,7 @@ import numpy as np
 
 from graspatlas.simulation.recording import CLOSING, PUSH, SQUEEZE, Recording
 from graspatlas.support.arrays import Array, IntArray
-from graspatlas.viewer.scene.animation import LOOKS, MAX_FRAMES, Film, Label, Readout, evenly_chosen
+from graspatlas.viewer.films.animation import LOOKS, MAX_FRAMES, Film, Label, Readout, evenly_chosen
 from graspatlas.viewer.scene.bodies import BodyShapes
 from graspatlas.viewer.scene.camera import Camera
 from graspatlas.viewer.scene.captions import trial_text

@@ -104,10 +104,15 @@ def grips(hand: Hand, count: int | None = None, links: Sequence[str] | None = No
     """
     pads = find_pads(hand, links)
     wanted = min(3, len(pads)) if count is None else count
-    if not 2 <= wanted <= len(pads):
+    if wanted < 2:
         raise GraspAtlasError(
-            f"{wanted} fingertips of hand '{hand.name}' cannot touch: it has {len(pads)} with a pad, and a grasp takes "
-            "two at least; name more links"
+            f"a grasp takes two fingertips at least; hand '{hand.name}' has {len(pads)} with a pad, and {wanted} would "
+            "touch: name more links, or ask for more fingers"
+        )
+    if wanted > len(pads):
+        raise GraspAtlasError(
+            f"{wanted} fingertips of hand '{hand.name}' cannot touch: it has {len(pads)} with a pad; name more "
+            "links, or ask for fewer fingers"
         )
     closing = Closing(hand, {})
     chains = [{joint.name for joint in closing.chain(hand.frame(pad.frame)[0])} for pad in pads]

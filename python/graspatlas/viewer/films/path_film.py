@@ -10,7 +10,7 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasp import Grasp
 from graspatlas.paths.path import GraspPath, Path
 from graspatlas.support.arrays import Array, IntArray
-from graspatlas.viewer.scene.animation import MAX_FRAMES, Film, Readout, evenly_chosen
+from graspatlas.viewer.films.animation import MAX_FRAMES, Film, Readout, evenly_chosen
 from graspatlas.viewer.scene.bodies import BodyShapes
 from graspatlas.viewer.scene.captions import index_name, legend, path_text
 from graspatlas.viewer.scene.meshes import arrow, ellipsoid, frame_along

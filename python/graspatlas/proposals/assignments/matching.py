@@ -13,8 +13,8 @@ from itertools import combinations, product
 
 import numpy as np
 
-from graspatlas.proposals.closure import imbalance
-from graspatlas.proposals.fingers import Fingers
+from graspatlas.proposals.assignments.closure import imbalance
+from graspatlas.proposals.assignments.fingers import Fingers
 from graspatlas.regions.region import Region
 from graspatlas.support.arrays import Array
 
@@ -73,11 +73,15 @@ class Counts:
     symmetric: int = 0
     unreachable: int = 0
 
+    @property
+    def left(self) -> int:
+        """Those that are looked at."""
+        return self.all - self.symmetric - self.unreachable
+
     def __str__(self) -> str:
-        left = self.all - self.symmetric - self.unreachable
         return (
             f"{self.all} assignments: {self.symmetric} the same as others by symmetry, {self.unreachable} out of reach "
-            f"of all postures that could hold anything, {left} left"
+            f"of all postures that could hold anything, {self.left} left"
         )
 
 
@@ -89,7 +93,7 @@ def assignments_of(
     Args:
         grips: The sets of fingertips.
         regions: The regions, the largest first.
-        symmetries: See :func:`graspatlas.proposals.symmetry.region_symmetries`.
+        symmetries: See :func:`graspatlas.proposals.assignments.symmetry.region_symmetries`.
         rng: Random numbers.
     """
     counts, found = Counts(), []

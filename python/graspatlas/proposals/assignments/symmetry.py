@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import permutations, product
 
 import numpy as np
@@ -14,6 +14,8 @@ __all__ = ["region_symmetries"]
 
 #: A turned point this near to the surface lies on it, as a share of the object's size.
 ON_SURFACE = 0.01
+#: Regions whose areas and distances differ by this share are alike.
+SAME = 0.03
 #: Points of each region that are turned.
 SAMPLES = 40
 
@@ -40,7 +42,8 @@ def region_symmetries(regions: Sequence[Region]) -> list[tuple[int, ...]]:
     middle, axes = _principal_axes(corners)
     trees = [cKDTree(each) for each in dense]
     found = [tuple(range(len(regions)))]
-    for turn in (*_turns(axes), *_turns(np.eye(3))):
+    centers = np.array([region.center for region in regions]) - middle
+    for turn in (*_turns(axes), *_turns(np.eye(3)), *_turns_of_centers(centers, areas)):
         moved = [(each - middle) @ turn.T + middle for each in samples]
         places = []
         for i, each in enumerate(moved):
@@ -54,6 +57,41 @@ def region_symmetries(regions: Sequence[Region]) -> list[tuple[int, ...]]:
         if len(places) == len(regions) and sorted(places) == list(range(len(regions))):
             found.append(tuple(places))
     return list(dict.fromkeys(found))
+
+
+def _turns_of_centers(centers: Array, areas: Array) -> Iterator[Array]:
+    """The rotations that take the centres of two regions to those of two others, as large and as far from the middle.
+
+    They find what principal axes leave open where two moments are equal, as those of a box with a square face.
+
+    Args:
+        centers: Centres of the regions, from the middle of the object (n, 3) [m].
+        areas: Areas of the regions (n,) [m2].
+    """
+    far = np.linalg.norm(centers, axis=1)
+    near = SAME * float(far.max())
+    alike = (np.abs(far[:, None] - far) < near) & (np.abs(areas[:, None] - areas) < SAME * areas)
+    pairs = [(i, j) for i, j in permutations(range(len(far)), 2) if _apart(centers[i], centers[j])]
+    if not pairs:
+        return
+    a, b = min(pairs, key=lambda pair: int(alike[pair[0]].sum() * alike[pair[1]].sum()))
+    frame, angle = _frame(centers[a], centers[b]), centers[a] @ centers[b]
+    for i, j in pairs:
+        if (i, j) != (a, b) and alike[a, i] and alike[b, j] and abs(centers[i] @ centers[j] - angle) < near * far.max():
+            yield _frame(centers[i], centers[j]) @ frame.T
+
+
+def _apart(a: Array, b: Array) -> bool:
+    """Whether two directions span a plane."""
+    return float(np.linalg.norm(np.cross(a, b))) > 0.1 * float(np.linalg.norm(a) * np.linalg.norm(b)) > 0.0
+
+
+def _frame(a: Array, b: Array) -> Array:
+    """The right-handed frame whose first axis is along a, and whose second is on the side of b; as columns."""
+    x = a / np.linalg.norm(a)
+    z = np.cross(a, b)
+    z /= np.linalg.norm(z)
+    return np.column_stack([x, np.cross(z, x), z])
 
 
 def _principal_axes(corners: Array) -> tuple[Array, Array]:

@@ -1,0 +1,1 @@
+"""Which fingertips could touch which regions: pruned before a grasp is looked for."""

@@ -1,0 +1,1 @@
+"""Scenes that change with time: paths of grasps and trials in the simulator."""
