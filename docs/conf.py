@@ -24,12 +24,14 @@ extensions = [
     "native_math",
     "explorer_pages",
 ]
-exclude_patterns = ["extensions", "images"]
+exclude_patterns = ["_static", "extensions", "images"]
 
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 4
 
 html_theme = "furo"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_title = f"graspatlas {version}"
 html_copy_source = False
 html_show_sourcelink = False
@@ -65,7 +67,7 @@ nitpick_ignore_regex = [
         r"(PlainTable|Vector3|Interval|End|Scale|DataFrame|AnyMesh|Scene|Rotation|(tuple|dict)\[str|tuple|dict)",
     ),
     ("py:class", r"graspatlas\.(support|atlas\.grid|patches\.(turned|spline|round|base)|viewer\.figures\.style)\..*"),
-    ("py:class", r"graspatlas\.(proposals\.matching\.Counts|problem\.object_joint\.ObjectJoint)"),
+    ("py:class", r"graspatlas\.(proposals\.assignments\.matching\.Counts|problem\.object_joint\.ObjectJoint)"),
     ("py:class", r"graspatlas\.(result\.exports\.Selection|quality\.batched\.F|optimizer\.rungs\.RungSummary)"),
     ("py:class", r"graspatlas\.(hand\.mechanism\.Mimic|atlas\.verification\.Check)"),
     ("py:func", r"graspatlas\.(analysis\.pareto\.knee|result\.(verification\.check_result|exports\.select))"),

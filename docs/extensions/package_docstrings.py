@@ -6,14 +6,19 @@ types lead to where a reader finds them: ``Grasp.pregrasp``, and a class by the 
 
 from __future__ import annotations
 
+import ast
+import inspect
 import re
+from importlib import import_module
 from typing import Any
 
 from docutils import nodes
 from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
+from sphinx.errors import ExtensionError
 from sphinx.ext.napoleon import GoogleDocstring
+from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.inspect import TypeAliasForwardRef
 from sphinx.util.nodes import make_refnode
 
@@ -72,12 +77,37 @@ def one_field(app: Sphinx, what: str, name: str, obj: object, options: object, l
         lines[number] = FIELD.sub(lambda found: f":{found[1]} {found[2].replace(', ', ',')}:{found[3]}", line)
 
 
+def source_of(module: str, name: str) -> str:
+    """The module that defines a name, followed through the imports of the modules that offer it."""
+    for node in ast.parse(inspect.getsource(import_module(module))).body:
+        if isinstance(node, ast.ImportFrom) and node.module and name in (alias.name for alias in node.names):
+            return source_of(node.module, name)
+    return module
+
+
+def commented(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
+    """Describe a constant by the comment ``#:`` above its definition, wherever that is.
+
+    Raises:
+        ExtensionError: There is no such comment.
+    """
+    if what != "data":
+        return
+    module, _, last = name.rpartition(".")
+    home = source_of(module, last)
+    comment = ModuleAnalyzer.for_module(home).find_attr_docs().get(("", last))
+    if comment is None:
+        raise ExtensionError(f"{last} has no comment '#:' above it in {home}, which the reference would show")
+    lines[:] = comment
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Read docstrings as prose, print types by their short names, and find names."""
     TypeAliasForwardRef.__repr__ = lambda self: str(self.name)  # type: ignore[method-assign]
     GoogleDocstring._consume_returns_section = returned  # type: ignore[method-assign]
     GoogleDocstring._parse_attribute_docstring = described  # type: ignore[method-assign]
     app.connect("autodoc-process-docstring", one_field, priority=600)  # after napoleon
+    app.connect("autodoc-process-docstring", commented)
     app.connect("autodoc-process-signature", without_factories)
     app.connect("missing-reference", find)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

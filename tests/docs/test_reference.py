@@ -11,7 +11,7 @@ from helpers import ROOT
 import graspatlas as ga
 
 DOCS = ROOT / "docs"
-ENTRY = re.compile(r"^\.\. (?:auto(?:class|function|exception)|py:data):: (\S+)(?:\n +:module: (\S+))?", re.MULTILINE)
+ENTRY = re.compile(r"^\.\. auto(?:class|data|function|exception):: (\S+)", re.MULTILINE)
 MODULE = re.compile(r"^\.\. automodule:: (\S+)", re.MULTILINE)
 #: Packages whose names are public beside those of graspatlas itself.
 PACKAGES = [
@@ -24,8 +24,7 @@ PACKAGES = [
 def entries() -> list[str]:
     """Full names of what the reference describes."""
     texts = [page.read_text(encoding="utf-8") for page in sorted((DOCS / "reference").glob("*.rst"))]
-    objects = [f"{module}.{name}" if module else name for text in texts for name, module in ENTRY.findall(text)]
-    return objects + [name for text in texts for name in MODULE.findall(text)]
+    return [name for text in texts for name in (*ENTRY.findall(text), *MODULE.findall(text))]
 
 
 def thing(name: str) -> object:

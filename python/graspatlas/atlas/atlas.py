@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 __all__ = ["BOX_TAG", "Atlas"]
 
 
-#: Facet tag of the initial box; a tag t >= 0 is the neighbour's index, t <= -2 is bound -2 - t.
+#: Tag of a facet that is a face of the box from which a chart's polytope is cut. A tag t >= 0 is the neighbour's index,
+#: t <= -2 is bound -2 - t.
 BOX_TAG = _core.Polytope.BOX_TAG
 #: Largest entry of |R(x)| of a point that is looked up.
 ON_MANIFOLD = 1e-6

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["COLUMNS", "ROWS", "Row", "read_rows", "write_rows"]
 
-#: Name of the file of rows in the folder of a sweep.
+#: Name of the file in the folder of a sweep that has a row for each run.
 ROWS = "runs.parquet"
 _TEXT, _NUMBER, _WHOLE, _FLAG, _NUMBERS, _TEXTS = "string", "float64", "int64", "bool_", "floats", "strings"
 #: Columns of a row and their types.
