@@ -64,7 +64,7 @@ class Samples(Grid):
         candidates = np.flatnonzero(self.accepted)
         if len(candidates) == 0:
             counts = ", ".join(f"{name} rejected {count}" for name, count in self.rejected.items()) or "none was made"
-            raise GraspAtlasError(f"none of {len(self)} samples meets the requirements ({counts}): relax one")
+            raise GraspAtlasError(f"none of {len(self)} samples meets the requirements ({counts}): relax a requirement")
         at = int(candidates[np.argmax(self.qualities[candidates])])
         one = Grasps(self.problem, self.x[at])[0]
         return replace(one, quality=float(self.qualities[at]), chart=int(self.charts[at]))

@@ -194,13 +194,11 @@ class Atlas(Light):
                 f"at {self.blocked} vertices no step succeeds, and what lies there is not known; use a smaller radius"
             )
         if self.complete and self.audit.points == 0:
-            doubts.append(
-                "no point could be found beside the charts, to look whether they cover all; use a smaller radius"
-            )
+            doubts.append("the audit found no point to test whether the charts cover everything; use a smaller radius")
         count = int(self.nearly_singular.sum())
         if count:
             doubts.append(
-                f"at {count} charts the Jacobian nearly loses rank: other branches may begin there; see whether "
+                f"at {count} charts the Jacobian nearly loses rank: other branches may begin there; check whether "
                 "find_components finds more"
             )
         return tuple(doubts)

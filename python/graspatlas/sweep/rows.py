@@ -74,7 +74,7 @@ def read_rows(path: Path) -> dict[str, Row]:
             table = pq.read_table(stream, schema=_schema())
     except (OSError, pa.ArrowException) as error:
         raise GraspAtlasError(
-            f"'{path}' is no file of a sweep ({error}); move it away or choose another folder"
+            f"'{path}' is not the file of a sweep ({error}); move it away or choose another folder"
         ) from None
     return {row["run"]: row for row in table.to_pylist()}
 

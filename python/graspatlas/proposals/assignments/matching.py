@@ -17,6 +17,7 @@ from graspatlas.proposals.assignments.closure import imbalance
 from graspatlas.proposals.assignments.fingers import Fingers
 from graspatlas.regions.region import Region
 from graspatlas.support.arrays import Array
+from graspatlas.support.words import Word
 
 __all__ = ["Assignment", "Counts", "assignments_of"]
 
@@ -59,6 +60,13 @@ class Assignment:
         return ", ".join(f"{pad.frame} on {region.name}" for pad, region in pairs)
 
 
+class Pruned(Word):
+    """Why an assignment is left out before a grasp of it is looked for."""
+
+    SYMMETRIC = "the same as others by symmetry"
+    UNREACHABLE = "out of reach of all postures that could hold anything"
+
+
 @dataclass
 class Counts:
     """How many assignments there are, and why some were left out.
@@ -80,8 +88,8 @@ class Counts:
 
     def __str__(self) -> str:
         return (
-            f"{self.all} assignments: {self.symmetric} the same as others by symmetry, {self.unreachable} out of reach "
-            f"of all postures that could hold anything, {self.left} left"
+            f"{self.all} assignments: {self.symmetric} {Pruned.SYMMETRIC}, {self.unreachable} {Pruned.UNREACHABLE}, "
+            f"{self.left} left"
         )
 
 
