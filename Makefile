@@ -10,7 +10,7 @@ $(BIN)/pybind11-stubgen graspatlas._core --output-dir $(1) --numpy-array-use-typ
 $(BIN)/ruff format --quiet --config pyproject.toml $(1)/graspatlas/_core.pyi
 endef
 
-.PHONY: demo test test-slow sanitize bench compare lint stubs format wheel clean
+.PHONY: demo test test-slow sanitize bench compare docs lint stubs format wheel clean
 
 demo: $(VENV)/.installed
 	$(BIN)/graspatlas optimize schunk_can --require force_closure:0.5:0.02 --require collision_free --refine --output out/schunk_can
@@ -42,6 +42,14 @@ bench: $(VENV)/.tools
 compare: $(VENV)/.tools
 	$(BIN)/python -m pip install --quiet "graspatlas[compare]"
 	$(BIN)/python benchmarks/compare.py
+
+# The documentation site, in build/docs/html; warnings are errors. It needs the network for Sphinx alone, the first time.
+# EXPLORER=planar_hand,schunk_can solves these bundled problems alone for the pages behind the gallery.
+EXPLORER ?=
+docs: $(VENV)/.docs
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --jobs auto $(if $(EXPLORER),-D explorer_problems=$(EXPLORER)) \
+	  --doctree-dir build/docs/doctrees docs build/docs/html
+	@echo "Open build/docs/html/index.html in a browser."
 
 lint: $(VENV)/.tools
 	$(BIN)/ruff check .
@@ -86,8 +94,12 @@ $(VENV)/.installed: $(VENV)/bin/python $(SOURCES)
 	touch $@
 
 $(VENV)/.tools: $(VENV)/bin/python $(SOURCES)
-	$(BIN)/python -m pip install ".[test,lint,stubs,sanitize]"
-	touch $@ $(VENV)/.installed
+	$(BIN)/python -m pip install ".[test,lint,stubs,sanitize,docs]"
+	touch $(VENV)/.installed $(VENV)/.docs $@
+
+$(VENV)/.docs: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet "graspatlas[docs]"
+	touch $@
 
 clean:
 	rm -rf $(VENV) build dist out

@@ -30,6 +30,8 @@ from graspatlas.problem_files import documents, read_problem
 
 DOCS = ROOT / "docs"
 BLOCK = re.compile(r"(?:<!-- ([\w ]+): ([^\n]*) -->\n)?```(\w*)\n(.*?)```\n", re.DOTALL)
+#: Contents of the site, which are neither code nor output.
+CONTENTS = re.compile(r"```\{toctree\}\n.*?```\n", re.DOTALL)
 NEEDS = re.compile(r"<!-- needs: (\S+) -->")
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#([^)]*))?\)")
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)")
@@ -56,7 +58,7 @@ class Block:
 
 
 def blocks_of(page: str) -> list[Block]:
-    text = read(page)
+    text = CONTENTS.sub(lambda contents: "\n" * contents[0].count("\n"), read(page))
     return [
         Block(m[1] or "", m[2] or "", m[3], m[4], text.count("\n", 0, m.start(3)) + 1) for m in BLOCK.finditer(text)
     ]

@@ -64,7 +64,7 @@ def test_a_wrong_system_is_refused(name):
     system, words = SYSTEMS[name]
     with pytest.raises(GraspAtlasError, match=words) as caught:
         check_system(system, AT)
-    assert "at point 0: not so:" in str(caught.value)
+    assert "at point 0: violated:" in str(caught.value)
 
 
 def test_right_systems_pass_and_the_figures_are_told():
@@ -153,7 +153,7 @@ PATCHES = {
 
 @pytest.mark.parametrize("fault", PATCHES)
 def test_a_wrong_patch_is_refused(fault):
-    with pytest.raises(GraspAtlasError, match=f"patch cylinder.*not so: .*{PATCHES[fault]}"):
+    with pytest.raises(GraspAtlasError, match=f"patch cylinder.*violated: .*{PATCHES[fault]}"):
         check_patch(Broken(radius=0.02, fault=fault))
 
 

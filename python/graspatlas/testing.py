@@ -157,12 +157,12 @@ class _Check:
     def small(self, error: float, limit: float, identity: str) -> None:
         if not error <= limit:  # so that NaN is refused
             raise GraspAtlasError(
-                f"{self.subject}: not so: {identity}; off by {error:.3g}, at most {limit:.3g} allowed"
+                f"{self.subject}: violated: {identity}; off by {error:.3g}, at most {limit:.3g} allowed"
             )
 
     def true(self, holds: bool, identity: str, got: str) -> None:
         if not holds:
-            raise GraspAtlasError(f"{self.subject}: not so: {identity}; got {got}")
+            raise GraspAtlasError(f"{self.subject}: violated: {identity}; got {got}")
 
 
 def _largest(difference: Array) -> float:

@@ -379,7 +379,8 @@ def test_path(cli, tmp_path):
     assert f"{len(rows) - 1} points" in out.splitlines()[0]
     status, out, err = cli("path", tmp_path, "--to", "first", "--html", tmp_path / "path.html")
     assert (status, out.splitlines()[0]) == (0, "schunk_oil_bottle: path of length 0 from chart 0 to chart 0, 1 points")
-    for words, message in ((("--from", "top"), "'top' names no grasp"), (("--to", "99999"), "end 99999 is no chart")):
+    wrong = ((("--from", "top"), "'top' names no grasp"), (("--to", "99999"), "end 99999 is not a chart"))
+    for words, message in wrong:
         status, out, err = cli("path", tmp_path, *words)
         assert (status, out, err.count("\n")) == (2, "", 1)
         assert message in err

@@ -53,7 +53,7 @@ WRONG_POSTURES = {
     "a,b\n1,nan\n": "joint 'b' must be a finite number",
     "a,b\n1,2\n": "samples: must have shape (z, 2) with z of at least 2, got (1, 2)",
     "a,b\n1,2\n3,4\n": "joint 'a' is not one of the hand's that move",
-    "index_pip\n1\n2\n": "say nothing of joint 'index_abduction', which moves",
+    "index_pip\n1\n2\n": "no values of joint 'index_abduction', which moves",
 }
 
 
@@ -105,5 +105,5 @@ def test_couplings_come_before_postures():
     np.testing.assert_array_equal(again.couplings, motions.couplings)
     stored = ga.HandMotions.from_dict(json.loads(json.dumps(motions.to_dict())))
     np.testing.assert_array_equal(stored.couplings, motions.couplings)
-    with pytest.raises(ga.GraspAtlasError, match="leave nothing"):
+    with pytest.raises(ga.GraspAtlasError, match="leave the 2 joints no freedom"):
         ga.HandMotions.from_couplings([{"a": 1}, {"b": 1}], "ab")

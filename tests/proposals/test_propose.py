@@ -123,7 +123,7 @@ def test_time_ends_it_with_what_there_is(can_file: Path, tmp_path: Path) -> None
 
 def test_a_hand_that_reaches_nothing_is_told_why(tmp_path: Path) -> None:
     trimesh.creation.box((0.9, 0.8, 0.9)).export(tmp_path / "crate.stl")
-    with pytest.raises(ga.GraspAtlasError, match="look whether its size fits the hand"):
+    with pytest.raises(ga.GraspAtlasError, match="check that its size fits the hand"):
         ga.propose(HAND, tmp_path / "crate.stl", tmp_path / "out", links=LINKS)
 
 

@@ -19,7 +19,7 @@ WRONG = {
     "no mesh": ([HAND, "text.stl"], r"mesh 'text\.stl' has no faces"),
     "a mesh of nothing": ([HAND, "empty.obj"], r"empty\.obj"),
     "a mesh in millimetres": ([HAND, "mm.stl"], r"0\.001"),
-    "a mesh too large": ([HAND, "crate.stl"], r"no posture .* could hold 'crate\.stl'.*look whether its size fits"),
+    "a mesh too large": ([HAND, "crate.stl"], r"no posture .* could hold 'crate\.stl'.*check that its size fits"),
     "too many fingers": ([HAND, "can.stl", "--fingers", "9"], r"9 fingertips .* it has 4 with a pad; name more links"),
     "one finger": ([HAND, "can.stl", "--fingers", "1"], r"takes two fingertips at least.*ask for more fingers"),
     "no number of fingers": ([HAND, "can.stl", "--fingers", "two"], r"invalid int value: 'two'"),

@@ -138,7 +138,7 @@ def test_the_urdf_states_efforts(can):
     np.testing.assert_array_equal(stated, quality.holding_force(grasps, 0.8, np.inf, efforts=efforts))
     assert (stated > quality.holding_force(grasps, 0.8, np.inf, efforts={n: e / 2 for n, e in efforts.items()})).all()
     planar = closed_grasps("planar_hand", 1)
-    with pytest.raises(ga.GraspAtlasError, match="states no effort"):
+    with pytest.raises(ga.GraspAtlasError, match="has no effort limit"):
         quality.holding_force(planar, efforts=True)
 
 

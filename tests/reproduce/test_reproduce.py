@@ -208,7 +208,7 @@ def test_a_folder_of_the_users_is_not_touched(tmp_path: Path) -> None:
     with pytest.raises(ga.GraspAtlasError, match="holds no earlier report"):
         reproduce(tmp_path / "mine", "sphere", progress=False)
     (tmp_path / "file").write_text("x", encoding="utf-8")
-    with pytest.raises(ga.GraspAtlasError, match="it is no folder"):
+    with pytest.raises(ga.GraspAtlasError, match="it is not a folder"):
         reproduce(tmp_path / "file", "sphere", progress=False)
     assert (tmp_path / "mine" / "thesis.txt").read_text(encoding="utf-8") == "years"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "mine"]

@@ -141,5 +141,5 @@ def test_wrong_input_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     with pytest.raises(ga.GraspAtlasError, match="no Dask scheduler answers"):
         run_sweep(["planar_hand"], tmp_path, scheduler="tcp://127.0.0.1:1")
     (tmp_path / ROWS).write_bytes(b"not a table")
-    with pytest.raises(ga.GraspAtlasError, match="is no file of a sweep"):
+    with pytest.raises(ga.GraspAtlasError, match="is not the file of a sweep"):
         run_sweep(["planar_hand"], tmp_path)

@@ -36,7 +36,7 @@ __all__ = ["Samples", "by_promise", "densify", "jumps"]
 
 @dataclass(frozen=True, eq=False)
 class Samples(Grid):
-    """Grasps on a grid that is denser than the charts' centres, with their qualities; see :class:`Grid`.
+    """Grasps on a grid that is denser than the charts' centres, with their qualities; see ``Grid``.
 
     Attributes:
         problem: The problem.
@@ -64,7 +64,7 @@ class Samples(Grid):
         candidates = np.flatnonzero(self.accepted)
         if len(candidates) == 0:
             counts = ", ".join(f"{name} rejected {count}" for name, count in self.rejected.items()) or "none was made"
-            raise GraspAtlasError(f"none of {len(self)} samples meets the requirements ({counts}): relax one")
+            raise GraspAtlasError(f"none of {len(self)} samples meets the requirements ({counts}): relax a requirement")
         at = int(candidates[np.argmax(self.qualities[candidates])])
         one = Grasps(self.problem, self.x[at])[0]
         return replace(one, quality=float(self.qualities[at]), chart=int(self.charts[at]))
@@ -78,7 +78,7 @@ class Samples(Grid):
 def densify(result: GraspAtlas, spacing: float, *, share: float = 1.0, progress: bool | None = None) -> Samples:
     """Read the index on a denser grid: inside the polytopes, at a spacing of your choice.
 
-    Everywhere, or where it promises most: see :func:`by_promise`. The charts are filled in that order, and Ctrl-C keeps
+    Everywhere, or where it promises most: see ``by_promise``. The charts are filled in that order, and Ctrl-C keeps
     what there is; the samples come by chart.
 
     Args:

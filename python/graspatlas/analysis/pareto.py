@@ -43,7 +43,7 @@ def pareto_front(result: GraspAtlas, *indices: Quality) -> IntArray:
     values = values_of(result, *indices)
     charts = np.flatnonzero(result.accepted)
     if len(charts) == 0:
-        raise GraspAtlasError("no grasp meets the requirements, so there is no front: relax one")
+        raise GraspAtlasError("no grasp meets the requirements, so there is no front: relax a requirement")
     return np.asarray(charts[_non_dominated(values[charts])], np.int64)
 
 

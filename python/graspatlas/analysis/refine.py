@@ -61,7 +61,7 @@ def refine(
     deadline = deadline_after(max_seconds)
     charts = local_maxima(result)[:MOST_STARTS]
     if len(charts) == 0:
-        raise GraspAtlasError("no grasp meets the requirements, so there is none to refine: relax one")
+        raise GraspAtlasError("no grasp meets the requirements, so there is none to refine: relax a requirement")
     bar = progress_bar("refine", "climbs", len(charts), progress)
     ends: list[Climb] = []
     starts = np.asarray(charts)

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 __all__ = ["BOX_TAG", "Atlas"]
 
 
-#: Facet tag of the initial box; a tag t >= 0 is the neighbour's index, t <= -2 is bound -2 - t.
+#: Tag of a facet that is a face of the box from which a chart's polytope is cut. A tag t >= 0 is the neighbour's index,
+#: t <= -2 is bound -2 - t.
 BOX_TAG = _core.Polytope.BOX_TAG
 #: Largest entry of |R(x)| of a point that is looked up.
 ON_MANIFOLD = 1e-6
@@ -61,7 +62,7 @@ class Atlas(Light):
         audit: How it was looked for points that no chart covers.
         centers: Chart centres x_i [n, configuration_size].
         bases: Orthonormal tangent bases Phi_i, one tangent vector a row [n, k, tangent_size].
-        residuals: Largest entry of |R(x_i)| [n].
+        residuals: Largest entry of ``|R(x_i)|`` [n].
         regularities: About the smallest singular value of the Jacobian at each centre [n], its rows divided by their
             largest entries.
         nearly_singular: Charts within which the Jacobian loses rank, or falls below a tenth of that [n].
@@ -193,13 +194,11 @@ class Atlas(Light):
                 f"at {self.blocked} vertices no step succeeds, and what lies there is not known; use a smaller radius"
             )
         if self.complete and self.audit.points == 0:
-            doubts.append(
-                "no point could be found beside the charts, to look whether they cover all; use a smaller radius"
-            )
+            doubts.append("the audit found no point to test whether the charts cover everything; use a smaller radius")
         count = int(self.nearly_singular.sum())
         if count:
             doubts.append(
-                f"at {count} charts the Jacobian nearly loses rank: other branches may begin there; see whether "
+                f"at {count} charts the Jacobian nearly loses rank: other branches may begin there; check whether "
                 "find_components finds more"
             )
         return tuple(doubts)
@@ -332,7 +331,7 @@ class Atlas(Light):
     def to_pandas(self, *, volumes: bool = False) -> DataFrame:
         """The charts as a table, one row a chart: centre, residual, neighbours, facets and closed vertices.
 
-        Columns are ``x0``, ``x1`` and so on, the numbers of the centre; ``residual``, the largest entry of |R(x)|;
+        Columns are ``x0``, ``x1`` and so on, the numbers of the centre; ``residual``, the largest entry of ``|R(x)|``;
         ``n_neighbours``; ``n_facets``; ``n_vertices``; and how many vertices were not expanded, by reason:
         ``closed_bounds``, ``closed_curvature``, ``closed_not_converged``, ``closed_covered``.
 

@@ -75,7 +75,7 @@ class CheckpointFolder:
             out |= {name: self._joined(name, parts) for name in _GROWING}
         except ValueError:
             raise GraspAtlasError(
-                f"the checkpoint is damaged: files of '{self.folder}' do not fit together; delete it to begin anew"
+                f"the checkpoint is damaged: files of '{self.folder}' do not fit together; delete it to start over"
             ) from None
         self._n_files, self._n_charts = len(parts), int(parts[-1]["first"])
         return out

@@ -117,8 +117,8 @@ class NumberedTasks(Generic[T]):
         except dask.KilledWorker as error:
             raise GraspAtlasError(
                 f"{self.what} {number} was given up after {error.allowed_failures + 1} workers died one after another "
-                f"while they had it, the last {error.last_worker.address}; look for the reason in their logs, perhaps "
-                "they have too little memory"
+                f"while they computed it, the last {error.last_worker.address}; look for the reason in their logs, "
+                "perhaps they have too little memory"
             ) from None
         except Exception as error:
             raise GraspAtlasError(

@@ -132,9 +132,7 @@ def _found(problem: Problem) -> Finding:
             hint = "a normal, an axis or a frozen u may be wrong; or state a reference, the hand about to close"
             return Finding(NOTE, "first grasp", text, hint)
         if metres > FAR_SHARE * hand_size(problem):
-            hint = (
-                "no nearer one was found: look whether the fingers can close round the object there, and at its frame"
-            )
+            hint = "no nearer one was found: check that the fingers can close around the object there, and its frame"
             return Finding(NOTE, "first grasp", text, hint)
     return Finding(OK, "first grasp", text, hint)
 

@@ -162,8 +162,8 @@ def _within_efforts(forces: ContactForces, hand: Hand, loaded: bool) -> ContactF
         )
     if not np.isfinite(forces.efforts).any():
         raise GraspAtlasError(
-            f"hand '{hand.name}' states no effort of any actuated joint, which within_efforts needs: write <limit "
-            "effort=...> [N m or N] into its URDF"
+            f"the URDF of hand '{hand.name}' has no effort limit of an actuated joint, which within_efforts needs: add "
+            "<limit effort=...> [N m or N]"
         )
     share = forces.effort_share
     return forces.scaled(1.0 / np.where(share > 1.0, share, 1.0))

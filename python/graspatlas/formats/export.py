@@ -20,7 +20,7 @@ __all__ = ["FORMATS", "export_grasps"]
 
 #: Coefficient of friction where no requirement states one.
 FRICTION = 0.5
-#: What writes each format.
+#: The formats of ``export_grasps`` by name, with the functions that write them.
 FORMATS: dict[str, Callable[[HandOver, Path], None]] = {
     "isaac_grasp": write_isaac_grasp,
     "dexgraspbench": write_dexgraspbench,

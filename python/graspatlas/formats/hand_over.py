@@ -87,9 +87,9 @@ def hand_over(
     loose = np.isnan(forces.joint_torques).any(axis=1)
     if loose.any():
         raise GraspAtlasError(
-            f"friction {friction:g} does not close {int(loose.sum())} of {len(grasps)} grasps, such as "
-            f"{names[loose.argmax()]}, so there are no forces to squeeze with; take grasps that meet force_closure, or "
-            "state the friction there is"
+            f"{int(loose.sum())} of {len(grasps)} grasps, such as {names[loose.argmax()]}, have no force closure with "
+            f"friction {friction:g}, so there are no internal forces to squeeze with; take grasps that meet "
+            "force_closure, or state the friction there is"
         )
     targets = grasps.squeeze(
         positive(stiffness, "stiffness"), normal_force=normal_force, friction=friction, torsional=torsional
@@ -113,5 +113,5 @@ def _check_joints(grasps: Grasps) -> None:
     for joint in grasps.problem.hand.model.hand_joints:
         if joint.v_size != 1:
             raise GraspAtlasError(
-                f"joint '{joint.name}' has {joint.v_size} degrees of freedom, which no format here has"
+                f"joint '{joint.name}' has {joint.v_size} degrees of freedom; these formats state one number a joint"
             )

@@ -85,7 +85,7 @@ class Hand(Body):
         folder: Path | None = None,
         limits: dict[str, tuple[float, float]] | None = None,
     ) -> Hand:
-        """Read a hand from an MJCF file, by MuJoCo; it then stands in :attr:`urdf` and needs MuJoCo no more.
+        """Read a hand from an MJCF file, by MuJoCo; it then stands in ``urdf`` and needs MuJoCo no more.
 
         Bodies become links, hinges and slides joints, linear couplings of two joints mimics, and sites frames. Geoms
         that take part in contacts become collision shapes, those of the groups 0 to 2 visual ones. What is left out is

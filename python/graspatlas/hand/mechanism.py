@@ -75,7 +75,9 @@ def read_mimics(root: ElementTree.Element) -> tuple[Mimic, ...]:
             other, factor, shift = links[other]
             multiplier, offset = multiplier * factor, multiplier * shift + offset
             if other in seen:
-                raise GraspAtlasError(f"joint '{name}' mimics '{links[name][0]}' in a ring of joints: break it")
+                raise GraspAtlasError(
+                    f"joint '{name}' mimics '{links[name][0]}' in a cycle of joints: remove one of these mimics"
+                )
             seen.add(other)
         turns = joints[other].get("type") == "continuous"
         mimics.append(Mimic(name, other, multiplier, offset, turns))

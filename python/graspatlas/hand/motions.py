@@ -85,7 +85,7 @@ class HandMotions:
         if c and np.linalg.matrix_rank(self.couplings) < c:
             raise GraspAtlasError("a coupling of the hand motions is empty or follows from the others: drop it")
         if c >= h:
-            raise GraspAtlasError(f"{c} couplings leave nothing of {h} joints to move")
+            raise GraspAtlasError(f"{c} couplings leave the {h} joints no freedom: drop some")
 
     @classmethod
     def from_samples(cls, samples: ArrayLike, joints: Sequence[str]) -> HandMotions:

@@ -232,7 +232,7 @@ def _with_followers(positions: Mapping[str, float], followers: Iterable[Mimic]) 
         if mimic.driver not in positions:
             if mimic.joint in positions:
                 raise GraspAtlasError(
-                    f"joint '{mimic.joint}' mimics '{mimic.driver}' and stands still only with it: lock "
+                    f"joint '{mimic.joint}' mimics '{mimic.driver}' and cannot be locked alone: lock "
                     f"'{mimic.driver}' instead"
                 )
             continue

@@ -76,8 +76,9 @@ def slice_dimension(problem: Problem) -> int:
     checked_instance(problem, Problem, "problem", "load_problem")
     if problem.largest_dimension < 1:
         raise GraspAtlasError(
-            f"problem '{problem.name}' leaves hand and object no motion, so there is nothing to search: its feasible "
-            "grasps are single points; give the contacts larger patches, or the hand more joints"
+            f"problem '{problem.name}' has isolated feasible grasps, from which hand and object cannot move while "
+            "the contacts are kept, so there is nothing to search; give the contacts larger patches, or the hand more "
+            "joints"
         )
     stated = problem.defaults.get("dimension", DIMENSION)
     return min(int(stated), problem.largest_dimension)

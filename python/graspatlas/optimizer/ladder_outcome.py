@@ -82,7 +82,9 @@ class Ladder:
         """
         values = [(rung.value, rung) for rung in self.rungs if rung.value is not None]
         if not values:
-            raise GraspAtlasError(f"none of {len(self)} rungs holds a grasp that meets the requirements: relax one")
+            raise GraspAtlasError(
+                f"none of {len(self)} rungs holds a grasp that meets the requirements: relax a requirement"
+            )
         return max(values, key=lambda pair: pair[0])[1]
 
     @property

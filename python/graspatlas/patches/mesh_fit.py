@@ -238,7 +238,7 @@ def _heights(triangles: Array, ticks: list[Array], half: Array) -> Array:
         found = h[0] + s * (h[1] - h[0]) + t * (h[2] - h[0])
         part = heights[i0:i1, j0:j1]
         if (np.abs(part - found)[inside] > SAME_HEIGHT * half.max()).any():
-            raise GraspAtlasError("the mesh lies over itself within size of the centre: choose a smaller size")
+            raise GraspAtlasError("the mesh folds over itself within size of the centre: choose a smaller size")
         part[inside] = found[inside]
     if np.isnan(heights).any():
         share = 100.0 * np.isnan(heights).mean()

@@ -42,7 +42,7 @@ class Path(Light):
         x: Its points [n, configuration_size].
         arc_length: Length up to each point [n], units of the tangent space (for grasps rad, and lengths divided by the
             problem's `length_scale`).
-        residuals: Largest entry of |R(x)| at each point [n].
+        residuals: Largest entry of ``|R(x)|`` at each point [n].
         tight: True when it is as short as its neighbours allow; False when shortening was interrupted or given up. It
             is a valid path in either case.
     """

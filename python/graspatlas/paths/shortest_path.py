@@ -169,7 +169,7 @@ class _End:
         if isinstance(value, Integral) and not isinstance(value, bool):
             chart = int(value)
             if not 0 <= chart < atlas.n_charts:
-                raise GraspAtlasError(f"{name} {chart} is no chart; the atlas has charts 0 to {atlas.n_charts - 1}")
+                raise GraspAtlasError(f"{name} {chart} is not a chart; the atlas has charts 0 to {atlas.n_charts - 1}")
             return cls(name, atlas.centers[chart], chart, True)
         x = number_array(value.x if isinstance(value, Grasp) else value, name)
         size = atlas.system.configuration_size

@@ -14,7 +14,8 @@ __all__ = ["REQUIREMENTS", "StatedRequirement", "parse_requirement", "requiremen
 #: Values of a requirement are at most this.
 LARGEST = 1e9
 
-#: Requirements by name, the cheapest first; each class with a name enters itself when its module is imported.
+#: Classes of requirements by the name under which problem files and the command line state them, the cheapest
+#: first. Each class with a name enters itself when its module is imported.
 REQUIREMENTS: dict[str, type[StatedRequirement]] = {}
 
 

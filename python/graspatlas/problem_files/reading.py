@@ -244,7 +244,7 @@ class _Reading:
                 raise unknown_name("joint", name, known, "one of the hand's that move")
         for name in joints:
             if name not in motions.joints:
-                raise GraspAtlasError(f"say nothing of joint '{name}', which moves: add it, or lock it under hand")
+                raise GraspAtlasError(f"no values of joint '{name}', which moves: add it, or lock it under hand")
         if len(motions.joints) > len(joints):
             motions = motions.reordered([name for name in motions.joints if name in joints])
         return replace(motions, couplings=coupling_rows(table.couplings, motions.joints))

@@ -110,7 +110,7 @@ def made_ready(
     )
     if not assignments:
         raise GraspAtlasError(
-            f"no posture of hand '{hand.name}' could hold '{mesh.name}' by its fingertips ({counts}): look whether its "
+            f"no posture of hand '{hand.name}' could hold '{mesh.name}' by its fingertips ({counts}): check that its "
             "size fits the hand, or name other links, such as the palm"
         )
     return Setting(

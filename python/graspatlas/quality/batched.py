@@ -21,7 +21,8 @@ from graspatlas.grasps.grasps import Grasps
 
 __all__ = ["Quality", "batched", "quality_name"]
 
-#: A quality index: the name of one of the package's, or a function of grasps; see the top of this module.
+#: A quality index: the name of one of the package's, a function of one grasp, or one of a batch of grasps that
+#: :func:`graspatlas.batched` marks.
 Quality = str | Callable[[Grasp], SupportsFloat] | Callable[[Grasps], ArrayLike]
 F = TypeVar("F", bound=Callable[..., object])
 

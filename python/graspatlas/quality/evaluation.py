@@ -29,7 +29,7 @@ from graspatlas.support.arrays import Array
 
 __all__ = ["INDICES", "evaluate", "find_index"]
 
-#: Indices by name.
+#: Indices by name, as ``optimize(quality=...)``, problem files and the command line state them.
 INDICES: dict[str, Callable[[Grasps], Array]] = {
     index.__name__: index
     for index in (

@@ -125,8 +125,8 @@ def resisted_load(
     loads = np.asarray(_core.resisted_loads(grasps.system, grasps.x, directions, limits))
     if np.isnan(loads).any():
         raise GraspAtlasError(
-            f"the load that grasp {int(np.isnan(loads).argmax())} resists cannot be told to one part in a million, so "
-            "near is it to losing force closure: require a margin of force closure"
+            f"the load that grasp {int(np.isnan(loads).argmax())} resists cannot be computed to one part in a million, "
+            "because the grasp nearly loses force closure: require a margin of force closure"
         )
     return loads
 
@@ -176,8 +176,8 @@ def _efforts(hand: Hand, efforts: Efforts) -> Array:
         stated = actuated_efforts(hand)
         if np.isnan(stated).all():
             raise GraspAtlasError(
-                f"hand '{hand.name}' states no effort of any actuated joint: write <limit effort=...> [N m or N] into "
-                "its URDF, or give efforts=3.0 or by joint"
+                f"the URDF of hand '{hand.name}' has no effort limit of an actuated joint: add <limit effort=...> "
+                "[N m or N], or give efforts=3.0 or by joint"
             )
         return np.where(np.isnan(stated), np.inf, stated)
     if not isinstance(efforts, Mapping):

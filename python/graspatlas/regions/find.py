@@ -91,7 +91,8 @@ def regions_of(
     limit = TOLERANCE * mesh.diagonal if tolerance is None else positive(tolerance, "tolerance")
     if limit > COARSEST * mesh.diagonal:
         raise GraspAtlasError(
-            f"tolerance {limit:g} m is more than a fifth of the mesh's diagonal, {mesh.diagonal:.3g} m: choose less"
+            f"tolerance {limit:g} m is more than a fifth of the mesh's diagonal, {mesh.diagonal:.3g} m: choose a "
+            "smaller one"
         )
     cutting = Cutting(mesh, limit, crease, smallest * float(mesh.areas.sum()))
     found = [region for part in cutting.parts() if (region := _region(mesh, part)) is not None]

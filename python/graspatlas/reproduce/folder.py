@@ -50,7 +50,7 @@ def _check(target: Path, path: str | os.PathLike[str]) -> None:
     """Refuse to replace what is not ours."""
     try:
         if target.is_symlink() or (target.exists() and not target.is_dir()):
-            raise GraspAtlasError(f"cannot write the report to '{path}': it is no folder; choose the name of a new one")
+            raise GraspAtlasError(f"cannot write the report to '{path}': it is not a folder; choose a new name")
         if target.is_dir() and not (target / MARKER).is_file() and any(target.iterdir()):
             raise GraspAtlasError(
                 f"folder '{path}' is not empty and holds no earlier report; nothing was changed: choose a new folder"

@@ -8,7 +8,7 @@ from graspatlas.requirements.holding_force import HoldingForce
 from graspatlas.requirements.joint_margin import JointMargin
 from graspatlas.requirements.screening import check_requirements, screen
 
-#: The earlier name of RequirementLike.
+#: The earlier name of :data:`RequirementLike`.
 Require = RequirementLike
 
 __all__ = [

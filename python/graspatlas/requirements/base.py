@@ -84,7 +84,8 @@ def tested(requirement: RequirementLike, problem: Problem, system: _core.GraspSy
     return [_core.test_measure(lambda X: asked(requirement, Grasps(problem, X, system)))]
 
 
-#: What may be required of grasps: a named requirement, or a function of a grasp; see the top of this module.
+#: What may be required of grasps: a named requirement, or a function that is true where a grasp meets it, of one grasp
+#: or of a batch of grasps that :func:`graspatlas.batched` marks.
 RequirementLike = StatedRequirement | Callable[[Grasp], bool | np.bool_] | Callable[[Grasps], ArrayLike]
 
 

@@ -65,7 +65,7 @@ class GraspAtlas(Light):
         quality: The index: its name, or the callable.
         qualities: Its value at each chart centre [n].
         quality_seconds: Time that its evaluation and that of the requirements took.
-        requirements: What a grasp must meet to be the best or the worst; a :class:`Lost` one where a file
+        requirements: What a grasp must meet to be the best or the worst; a ``Lost`` one where a file
             did not keep a function.
         accepted: Which charts meet the requirements [n].
         rejected: How many charts each requirement rejected, of those that the ones before it had left.
@@ -86,7 +86,7 @@ class GraspAtlas(Light):
 
     def __repr__(self) -> str:
         atlas = f"{self.atlas.n_charts} charts, k = {self.dimension}, {self.status}"
-        best = f"{self.qualities[self.accepted].max():.6g}" if self.accepted.any() else "none, no grasp will do"
+        best = f"{self.qualities[self.accepted].max():.6g}" if self.accepted.any() else "none, all rejected"
         if self.refinement:
             best = f"{self.refined_best.quality:.6g}, refined"
         return f"<{type(self).__name__} of {self.problem.name!r}: {atlas}; best {quality_name(self.quality)} {best}>"
@@ -152,7 +152,9 @@ class GraspAtlas(Light):
         """
         if not self.accepted.any():
             counts = ", ".join(f"{name} rejected {count}" for name, count in self.rejected.items())
-            raise GraspAtlasError(f"none of {self.atlas.n_charts} grasps meets the requirements ({counts}): relax one")
+            raise GraspAtlasError(
+                f"none of {self.atlas.n_charts} grasps meets the requirements ({counts}): relax a requirement"
+            )
         return np.flatnonzero(self.accepted)
 
     def accepted_charts(self) -> IndexArray:

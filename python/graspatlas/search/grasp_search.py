@@ -26,7 +26,7 @@ from graspatlas.support.validation import whole
 
 __all__ = ["MAX_TRIES", "GraspSearch", "can_grow", "find_grasps", "with_first_grasp"]
 
-#: Tries in a row without a grasp after which a search is given up: about half a minute.
+#: Starts in a row without a new grasp after which a search is given up: about half a minute.
 MAX_TRIES = 20_000
 #: Two grasps are one when their embeddings are nearer than this [units of the tangent space].
 SAME = 1e-6
@@ -62,8 +62,8 @@ def find_grasps(
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
     Returns:
-        The grasps, one a row (n, size of x), all with |R(x)| of at most 1e-9 and within all bounds; n is smaller than
-        `count`, perhaps 0, when the search ended early.
+        The grasps, one a row (n, size of x), all with ``|R(x)|`` of at most 1e-9 and within all bounds; n is smaller
+        than `count`, perhaps 0, when the search ended early.
 
     Raises:
         GraspAtlasError: If an argument is out of its range.

@@ -12,11 +12,19 @@ import numpy as np
 from graspatlas.errors import GraspAtlasError
 from graspatlas.storage.files import read_text, replaced
 from graspatlas.support.arrays import Array, BoolArray, IntArray
+from graspatlas.support.words import Word
 
 __all__ = ["Simulation", "SimulationSummary", "TrialRecord", "load_simulation"]
 
 FORMAT = "graspatlas simulation"
 FORMAT_VERSION = 1
+
+
+class LostWhile(Word):
+    """When the object of a trial was lost."""
+
+    CLOSING = "closing"
+    PUSHED = "pushed"
 
 
 class TrialRecord(TypedDict):
@@ -162,8 +170,8 @@ class Simulation:
 
     def _lost_while(self, i: int) -> str | None:
         if self.lost_closing[i]:
-            return "closing"
-        return None if self.held[i] else "pushed"
+            return str(LostWhile.CLOSING)
+        return None if self.held[i] else str(LostWhile.PUSHED)
 
     def summary(self) -> SimulationSummary:
         """The trials in plain data, as the command line prints them."""

@@ -58,7 +58,7 @@ class Protocol:
 
 _DEXGRASPBENCH = "Chen et al., BODex and Dexonomy (2025), released configuration of DexGraspBench; MuJoCo"
 
-#: Protocols by name.
+#: Protocols of trials by name, as ``simulate(protocol=...)`` and the command line state them.
 PROTOCOLS: dict[str, Protocol] = {
     protocol.name: protocol
     for protocol in (

@@ -99,7 +99,7 @@ class Scene:
             return library.MjModel.from_xml_string(self.xml)
         except ValueError as error:
             reason = " ".join(str(error).split())
-            raise GraspAtlasError(f"MuJoCo refuses the scene of problem '{self.problem.name}': {reason}") from None
+            raise GraspAtlasError(f"MuJoCo cannot load the scene of problem '{self.problem.name}': {reason}") from None
 
     def configurations(self, positions: Array, T_palm_object: Array) -> Array:
         """MuJoCo's configurations (n, nq) of joint positions (n, h) and poses of the object (n, 4, 4)."""
@@ -181,8 +181,8 @@ class Scene:
         for shape in self._shapes.object:
             if shape.is_mesh:
                 raise GraspAtlasError(
-                    f"the collision mesh '{shape.name}' of the object is not convex, MuJoCo would fill its hollows: "
-                    "state convex pieces instead, such as those that CoACD makes"
+                    f"the collision mesh '{shape.name}' of the object is not convex, and MuJoCo would use its "
+                    "convex hull: decompose it into convex pieces, for example with CoACD"
                 )
             T = shape.placement.copy()
             T[:3, 3] -= self.center_of_mass

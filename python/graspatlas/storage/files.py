@@ -150,7 +150,7 @@ def opened(path: str | os.PathLike[str], what: str = "file") -> Iterator[BinaryI
         raise GraspAtlasError(f"cannot read {what} '{source}': {error}; correct the path") from None
     if kind not in ("a file", "a folder"):  # a folder says so when it is opened
         raise GraspAtlasError(
-            f"cannot read {what} '{source}': it is {kind}, which cannot be read from the middle; save it as a file"
+            f"cannot read {what} '{source}': it is {kind}, which allows no random access; save it as a regular file"
         )
     with open(source, "rb") as stream:
         yield stream

@@ -63,4 +63,4 @@ def read_run_file(path: Path, digest: str) -> dict[str, AnyArray]:
 def damaged(path: Path, reason: object = "") -> GraspAtlasError:
     """What to say of a file whose arrays make no sense."""
     why = f" ({reason})" if str(reason) else ""
-    return GraspAtlasError(f"'{path}' is damaged or no checkpoint{why}; delete '{path.parent}' to begin anew")
+    return GraspAtlasError(f"'{path}' is damaged or no checkpoint{why}; delete '{path.parent}' to start over")

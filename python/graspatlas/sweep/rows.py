@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["COLUMNS", "ROWS", "Row", "read_rows", "write_rows"]
 
-#: Name of the file of rows in the folder of a sweep.
+#: Name of the file in the folder of a sweep that has a row for each run.
 ROWS = "runs.parquet"
 _TEXT, _NUMBER, _WHOLE, _FLAG, _NUMBERS, _TEXTS = "string", "float64", "int64", "bool_", "floats", "strings"
 #: Columns of a row and their types.
@@ -74,7 +74,7 @@ def read_rows(path: Path) -> dict[str, Row]:
             table = pq.read_table(stream, schema=_schema())
     except (OSError, pa.ArrowException) as error:
         raise GraspAtlasError(
-            f"'{path}' is no file of a sweep ({error}); move it away or choose another folder"
+            f"'{path}' is not the file of a sweep ({error}); move it away or choose another folder"
         ) from None
     return {row["run"]: row for row in table.to_pylist()}
 

@@ -106,7 +106,7 @@ class _Converter:
         moved = [b for b in range(1, self._model.nbody) if self._hinges(b)]
         if not moved:
             raise GraspAtlasError(
-                f"'{self._path}' has no hinge or slide joint: it is no hand, or its joints stand in another file"
+                f"'{self._path}' has no hinge or slide joint: it is not a hand, or its joints are in another file"
             )
         palm, fingers = 0, self._fingers(0, moved)
         while len(fingers) == 1:

@@ -18,6 +18,7 @@ from graspatlas.proposals.assignments.fingers import Fingers
 from graspatlas.proposals.assignments.planes import Planes
 from graspatlas.regions.region import Region
 from graspatlas.support.arrays import Array
+from graspatlas.support.words import Word
 
 __all__ = ["Assignment", "Counts", "assignments_of"]
 
@@ -60,6 +61,14 @@ class Assignment:
         return ", ".join(f"{pad.frame} on {region.name}" for pad, region in pairs)
 
 
+class Pruned(Word):
+    """Why an assignment is left out before a grasp of it is looked for."""
+
+    HIDDEN = "behind an obstacle"
+    SYMMETRIC = "the same as others by symmetry"
+    UNREACHABLE = "out of reach of all postures that could hold anything"
+
+
 @dataclass
 class Counts:
     """How many assignments there are, and why some were left out.
@@ -82,10 +91,10 @@ class Counts:
         return self.all - self.hidden - self.symmetric - self.unreachable
 
     def __str__(self) -> str:
-        hidden = f"{self.hidden} behind an obstacle, " if self.hidden else ""
+        hidden = f"{self.hidden} {Pruned.HIDDEN}, " if self.hidden else ""
         return (
-            f"{self.all} assignments: {hidden}{self.symmetric} the same as others by symmetry, "
-            f"{self.unreachable} out of reach of all postures that could hold anything, {self.left} left"
+            f"{self.all} assignments: {hidden}{self.symmetric} {Pruned.SYMMETRIC}, "
+            f"{self.unreachable} {Pruned.UNREACHABLE}, {self.left} left"
         )
 
 
