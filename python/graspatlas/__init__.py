@@ -66,6 +66,7 @@ if typing.TYPE_CHECKING:
     from graspatlas.requirements.force_closure import ForceClosure
     from graspatlas.requirements.holding_force import HoldingForce
     from graspatlas.requirements.joint_margin import JointMargin
+    from graspatlas.requirements.rejections import Rejection
     from graspatlas.result.gap import Gap
     from graspatlas.result.refinement import Refinement, SearchReport
     from graspatlas.result.result import Result, load_result
@@ -128,6 +129,7 @@ __all__ = [
     "Recording",
     "Refinement",
     "Region",
+    "Rejection",
     "Repair",
     "Result",
     "Rung",
@@ -229,6 +231,7 @@ _HOMES: dict[str, tuple[str, ...]] = {
     "requirements.force_closure": ("ForceClosure",),
     "requirements.holding_force": ("HoldingForce",),
     "requirements.joint_margin": ("JointMargin",),
+    "requirements.rejections": ("Rejection",),
     "result.gap": ("Gap",),
     "result.refinement": ("Refinement", "SearchReport"),
     "result.result": ("Result", "load_result"),

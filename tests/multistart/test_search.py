@@ -177,7 +177,9 @@ def test_an_index_without_a_maximum_is_called_so(problem: ga.Problem) -> None:
 
 def test_requirements_that_nothing_meets_are_named(problem: ga.Problem, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("graspatlas.multistart.search.EMPTY_ROUNDS", 2)
-    with pytest.raises(ga.GraspAtlasError, match=r"the nearest misses force_closure:0\.5:0\.3 by 0\.\d+") as caught:
+    with pytest.raises(
+        ga.GraspAtlasError, match=r"the nearest misses force_closure:0\.5:0\.3: margin 0\.\d+, 0\.3 is"
+    ) as caught:
         ga.optimize(problem, motions="all", require=[ga.ForceClosure(0.5, 0.3)])
     assert isinstance(caught.value.result, ga.Result)  # type: ignore[attr-defined]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 import graspatlas as ga
+from graspatlas.paths.pieces import narrowest_gap
 from graspatlas.requirements import screen
 from graspatlas.requirements.lost import Lost
 from graspatlas.systems import geodesic
@@ -313,13 +315,42 @@ def test_an_atlas_needs_an_end_and_has_no_requirements(sphere: ga.Atlas) -> None
         ga.shortest_path(half, 0, [0.0, 0.0, -1.0])
 
 
+def test_the_narrowest_gap_is_along_the_atlas(sphere: ga.Atlas) -> None:
+    """Two caps of a sphere: their nearest charts, and a chain of charts between that lie in neither."""
+    heights = sphere.centers[:, 2]
+    north, south = (np.flatnonzero(side * heights > 0.5) for side in (1.0, -1.0))
+    gap = narrowest_gap(sphere, north, south)
+    assert gap.charts[0] in north
+    assert gap.charts[1] in south
+    assert gap.between is not None
+    assert (np.abs(heights[list(gap.between)]) <= 0.5).all()
+    chain = [gap.charts[0], *gap.between, gap.charts[1]]
+    assert all(b in sphere.neighbours[a] for a, b in pairwise(chain))
+    distances = np.linalg.norm(sphere.centers[north][:, None] - sphere.centers[south][None], axis=2)
+    assert 0.98 * distances.min() < gap.distance < 1.1 * distances.min()
+    alone = replace(sphere, neighbour_pairs=sphere.neighbour_pairs[:0])
+    apart = narrowest_gap(alone, north, south)
+    assert apart.between is None
+    assert apart.distance == pytest.approx(distances.min(), rel=0.01)
+
+
 def test_pieces_that_are_not_connected(held: ga.Result) -> None:
     cut = held.accepted.copy()
     cut[held.atlas.neighbours[held.best.chart]] = False
     apart, start = replace(held, accepted=cut), int(np.flatnonzero(cut)[0])
-    words = r"not connected: the \d+ charts that meet the requirements form \d+ pieces.*end in one of 1;"
-    with pytest.raises(ga.GraspAtlasError, match=words):
-        ga.shortest_path(apart, start, held.best.chart, accepted=True)
+    best = held.best.chart
+    words = (
+        rf"start \(chart {start}\) and end \(chart {best}\) are not connected: the {cut.sum()} charts that meet the "
+        rf"requirements form \d+ pieces.*end in one of 1; nearest are chart (\d+) in start's piece and chart {best} in "
+        r"end's, (\S+) apart, with (one|\d+) rejected charts? between.*such as chart \1, relax a requirement, or"
+    )
+    with pytest.raises(ga.GraspAtlasError, match=words) as caught:
+        ga.shortest_path(apart, start, best, accepted=True)
+    found = re.search(words, str(caught.value))
+    assert found is not None
+    assert ga.shortest_path(apart, start, int(found[1]), accepted=True).accepted.all()
+    away = held.system.difference(held.atlas.centers[best], held.atlas.centers[int(found[1])])
+    assert float(found[2]) == pytest.approx(np.linalg.norm(away), rel=1e-2)
     refused = int(np.flatnonzero(~held.accepted)[0])
     with pytest.raises(ga.GraspAtlasError, match=rf"start \(chart {refused}\) does not meet the requirements"):
         ga.shortest_path(held, refused, accepted=True)

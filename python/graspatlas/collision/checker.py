@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from graspatlas import _core
+from graspatlas.collision.clash import Clash
 from graspatlas.collision.problem_shapes import collision_shapes
 from graspatlas.collision.shapes import Shape, convex_hull, thinner
 from graspatlas.errors import GraspAtlasError
@@ -83,13 +84,15 @@ class CollisionChecker:
     """
 
     def __init__(self, problem: Problem, touch_depth: float = 0.002, clearance: float = 0.0) -> None:
-        self._hand = problem.hand
+        self._hand, self._object_name = problem.hand, problem.object.name
+        self._obstacles = [obstacle.name for obstacle in problem.obstacles]
         model = problem.object_joint_model.model(problem.hand.tree)
         shapes, pairs = _joined(problem, model.object_joint, touch_depth, clearance)
         self._shapes = tuple(shapes)
         self._size = model.q_size
         self.pairs = tuple((shapes[pair.first].name, shapes[pair.second].name) for pair in pairs)
         self.required: Array = np.array([pair.required for pair in pairs])
+        self._stated = tuple(pairs)
         self.thinned = {shape.name: shape.error for shape in shapes if shape.error > 0.0}
         numbers = np.array([(pair.first, pair.second) for pair in pairs], np.int32).reshape(-1, 2)
         self.batch = _core.CollisionBatch(model, [shape.as_tuple() for shape in shapes], numbers, self.required)
@@ -146,6 +149,38 @@ class CollisionChecker:
         found = self.batch.nearest(self._rows(X), chosen)
         return Nearest(tuple(self.pairs[i] for i in chosen), **found)
 
+    def worst(self, x: ArrayLike) -> Clash | None:
+        """The two shapes of a grasp that miss the distance which they must keep by most; None where there are no pairs.
+
+        Args:
+            x: The grasp (configuration_size,).
+        """
+        rows = self._rows(np.asarray(x, float)[None])
+        found = self.batch.nearest(rows, self._chosen(None))
+        distances, points = found["distances"][0], 0.5 * (found["on_first"] + found["on_second"])[0]
+        cut = ~np.isfinite(found["normals"][0]).all(axis=1) & (distances <= self.required)
+        slacks = np.where(cut, -np.inf, distances - self.required)
+        if not len(slacks):
+            return None
+        number = int(np.argmin(slacks))
+        pair = self._stated[number]
+        shapes = self._shapes[pair.first], self._shapes[pair.second]
+        return Clash(
+            shapes=shapes,
+            names=(self._body_of(shapes[0]), self._body_of(shapes[1])),
+            groups=(_group_of(shapes[0]), _group_of(shapes[1])),
+            distance=float("nan") if cut[number] else float(distances[number]) - pair.thinned,
+            required=pair.required - pair.thinned,
+            point=points[number],
+        )
+
+    def _body_of(self, shape: Shape) -> str:
+        """What a shape belongs to: a link, the object or an obstacle."""
+        group, name = _group_of(shape), shape.name.removeprefix(OBSTACLE)
+        if group == "obstacle":
+            return name if name in self._obstacles else name.rpartition("_")[0]
+        return self._object_name if group == "object" else shape.link
+
     def depths(self, x: ArrayLike, frame: str | None, points: ArrayLike) -> Array:
         """How far points are from the collision shapes of a link or of the object, at a grasp.
 
@@ -188,11 +223,12 @@ def collision_checker(problem: Problem, touch_depth: float = 0.002, clearance: f
 
 @dataclass(frozen=True)
 class _Pair:
-    """Numbers of two shapes, and the distance that they must keep [m]."""
+    """Numbers of two shapes, the distance that they must keep, and by how much the first was made thinner [m]."""
 
     first: int
     second: int
     required: float
+    thinned: float = 0.0
 
 
 def _joined(
@@ -212,7 +248,8 @@ def _joined(
             elif not (of_link.is_mesh or shape.is_mesh):
                 pairs.append(_Pair(first, second, -touch_depth))
             elif (stand_in := _may_touch(of_link, shape.is_mesh, touch_depth)) is not None:
-                pairs.append(_Pair(len(shapes), second, 0.0 if shape.is_mesh else -touch_depth))
+                sunk = (0.0, touch_depth) if shape.is_mesh else (-touch_depth, 0.0)
+                pairs.append(_Pair(len(shapes), second, *sunk))
                 shapes.append(stand_in)
     of_object = [i for i, shape in enumerate(shapes) if _in_object(shape)]
     for obstacle in stated.obstacles:
@@ -242,6 +279,13 @@ def _carried(shape: Shape, joint: int | None) -> bool:
     if joint is None:
         return _in_object(shape)
     return not shape.name.startswith((OBJECT, OBSTACLE)) and shape.joint == joint
+
+
+def _group_of(shape: Shape) -> str:
+    """Whether a shape is of the hand, the object or an obstacle."""
+    if shape.name.startswith(OBSTACLE):
+        return "obstacle"
+    return "object" if _in_object(shape) else "hand"
 
 
 def _in_object(shape: Shape) -> bool:

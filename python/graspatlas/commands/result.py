@@ -20,12 +20,21 @@ __all__ = ["add_commands"]
 
 def add_commands(commands: Subcommands) -> None:
     """Add view, export and check-result to the subcommands of a parser."""
-    look = commands.add_parser("view", help="look at a result: its best and worst grasp, or as a page its whole atlas")
+    look = commands.add_parser(
+        "view", help="look at a result: its best grasp and another, or as a page its whole atlas"
+    )
     look.add_argument("result", type=path_word, help="folder or file that optimize wrote")
     look.add_argument(
         "--html", type=path_word, metavar="FILE", help="write a page of all grasps, which needs no server, instead"
     )
-    look.add_argument("--chart", metavar="CHART", help="open that page at this one: a number, first, best or worst")
+    look.add_argument(
+        "--chart",
+        metavar="CHART",
+        help="show this grasp beside the best, or open the page at it: a chart's number, first, best, worst or nearest",
+    )
+    look.add_argument(
+        "--alone", action="store_true", help="without the worst beside the best, or the best beside a chart"
+    )
     look.add_argument("--picture", type=path_word, metavar="FILE", help="write a PNG picture instead")
     look.add_argument("--no-browser", action="store_true", help="do not open a browser, only say where to look")
     look.add_argument(
@@ -65,20 +74,18 @@ def add_commands(commands: Subcommands) -> None:
 
 
 def _view(options: argparse.Namespace) -> int:
-    if options.chart is not None and not options.html:
-        raise GraspAtlasError("--chart says where a page opens: give --html FILE too")
     result = load_result(options.result)
+    chart = None if options.chart is None else chart_named(result, options.chart)
     from graspatlas.viewer import export_html, save_picture, view  # slow to import
 
     if options.html:
-        chart = None if options.chart is None else chart_named(result, options.chart)
         export_html(result, options.html, chart=chart)
         say(f"wrote {options.html}: open it in a browser", file=sys.stderr)
     if options.picture:
-        save_picture(result, options.picture)
+        save_picture(result, options.picture, chart=chart, worst=not options.alone)
         say(f"wrote {options.picture}", file=sys.stderr)
     if not options.html and not options.picture:
-        view(result, open_browser=not options.no_browser, host=options.host)
+        view(result, open_browser=not options.no_browser, host=options.host, chart=chart, worst=not options.alone)
     return 0
 
 

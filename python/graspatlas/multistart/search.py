@@ -10,13 +10,13 @@ from functools import partial
 
 import numpy as np
 
-from graspatlas.analysis.objective import Objective
 from graspatlas.analysis.unbounded import Around, levels_around, never_levels_off, rises_towards_one_point
 from graspatlas.errors import GraspAtlasError
 from graspatlas.multistart.census import Census, FoundPeak
 from graspatlas.multistart.checkpoint import RoundFolder
 from graspatlas.multistart.rounds import FIRST_STEP, Plan, Round, RoundKind, Starts, climbed, run_round
-from graspatlas.requirements.base import requirement_name
+from graspatlas.requirements.base import asked
+from graspatlas.requirements.rejections import rejections
 from graspatlas.result.refinement import Refinement, SearchEnd, SearchReport
 from graspatlas.support.arrays import Array
 from graspatlas.support.deadlines import deadline_after
@@ -214,21 +214,14 @@ class Search:
 
 def nothing_meets(plan: Plan, census: Census) -> GraspAtlasError:
     """What to say where no climb met the requirements: which of them the nearest end misses, and by how much."""
-    objective = plan.objective
     said = "no climb found a grasp at all"
     if census.least_missed is not None:
-        x = census.least_missed[1][None]
-        parts = []
-        for requirement in plan.requirements:
-            alone = Objective(plan.problem, objective.system, plan.quality, (requirement,), FIRST_STEP)
-            if not alone.meets(x)[0]:
-                by = float(alone.missed(x)[0])
-                parts.append(
-                    f"{requirement_name(requirement)} by {by:.3g}" if np.isfinite(by) else requirement_name(requirement)
-                )
-        said = "the nearest misses " + (" and ".join(parts) or f"a bound by {census.least_missed[0]:.3g}")
+        missed, x = census.least_missed
+        grasp = plan.objective.grasps(x[None])
+        rejected = any(not asked(each, grasp)[0] for each in plan.requirements)
+        parts = map(str, rejections(plan.requirements, grasp)) if rejected else [f"a bound by {missed:.3g}"]
+        said = "the nearest misses " + " and ".join(parts)
     return GraspAtlasError(
         f"no feasible grasp of problem '{plan.problem.name}' that meets the requirements was found in {census.climbs} "
-        f"climbs from {census.tries} random starts: {said} (of force closure in units of its margin, of distances in "
-        "units of length_scale, of joints in radians); relax it, or search longer"
+        f"climbs from {census.tries} random starts: {said}; relax it, or search longer"
     )

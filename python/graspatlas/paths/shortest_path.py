@@ -18,6 +18,7 @@ from graspatlas.atlas.atlas import Atlas
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasp import Grasp
 from graspatlas.paths.path import GraspPath, Path
+from graspatlas.paths.pieces import NotConnected, Piece, apart
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.support.interrupts import stoppable
@@ -124,7 +125,11 @@ def shortest_path(
     if float(np.linalg.norm(atlas.system.difference(ends[0].x, ends[1].x))) <= SAME:
         X, tight = ends[0].x[None], True
     else:
-        X = _ChartGraph(atlas, open_charts, ends, longest / SPARE, allowed).shortest_chain()
+        graph = _ChartGraph(atlas, open_charts, ends, longest / SPARE, allowed)
+        try:
+            X = graph.shortest_chain()
+        except NotConnected as error:
+            raise apart(error, atlas, result if allowed is not None else None, open_charts) from None
         X, tight = _shortened(atlas, X, longest, allowed, progress)
     residuals = np.array([np.abs(atlas.system.evaluate_residual(x)).max(initial=0.0) for x in X])
     arguments = (atlas, X, arc_lengths(atlas.system, X), residuals, tight)
@@ -184,14 +189,18 @@ class _End:
         near = float(np.linalg.norm(atlas.system.difference(atlas.centers[chart], x))) <= SAME
         return cls(name, x, chart, near)
 
+    @property
+    def words(self) -> str:
+        """Which end it is, and where."""
+        return f"{self.name} ({'chart' if self.at_centre else 'in chart'} {self.chart})"
+
     def must_meet(self, result: GraspAtlas) -> None:
         """Make sure that the grasp meets the requirements."""
         if self.at_centre and result.accepted[self.chart]:
             return
         if self.at_centre or not result.meets(self.x[None])[0]:
-            where = f"chart {self.chart}" if self.at_centre else f"in chart {self.chart}"
             raise GraspAtlasError(
-                f"{self.name} ({where}) does not meet the requirements, which {result.accepted.sum()} charts do: see "
+                f"{self.words} does not meet the requirements, which {result.accepted.sum()} charts do: see "
                 "result.accepted, or leave out accepted=True"
             )
 
@@ -276,7 +285,7 @@ class _ChartGraph:
         graph = self._graph()
         distances, before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
         if not np.isfinite(distances[end]):
-            raise self._not_connected(graph)
+            raise NotConnected(*self._pieces(graph), self.n_closed)
         route = [end]
         while route[-1] != start:
             route.append(int(before[route[-1]]))
@@ -288,16 +297,14 @@ class _ChartGraph:
         n = len(self.points)
         return coo_array((self.lengths, (self.pairs[:, 0], self.pairs[:, 1])), shape=(n, n)).tocsr()
 
-    def _not_connected(self, graph: sparse.csr_array) -> GraspAtlasError:
+    def _pieces(self, graph: sparse.csr_array) -> tuple[tuple[Piece, Piece], int]:
+        """The pieces of the graph in which start and end lie, and how many there are."""
         from scipy.sparse.csgraph import connected_components  # slow to import
 
         group = connected_components(graph, directed=False)[1]
-        sizes = [int((group[self.open] == group[node]).sum()) for node in self.nodes]
-        pieces = len(np.unique(group[self.open]))
-        kind = "charts that meet the requirements" if self.allowed is not None else "charts"
-        parted = f" ({self.n_closed} pairs of neighbours parted by grasps between them)" if self.n_closed else ""
-        return GraspAtlasError(
-            f"start and end are not connected: the {self.open[: self.atlas.n_charts].sum()} {kind} form {pieces} "
-            f"pieces{parted}, start lies in one of {sizes[0]} charts, end in one of {sizes[1]}; choose an end in "
-            "start's piece" + (", or leave out accepted=True" if self.allowed is not None else "")
-        )
+        charts = np.arange(self.atlas.n_charts)
+        pieces = [
+            Piece(end.words, charts[self.open[charts] & (group[charts] == group[node])])
+            for end, node in zip(self.ends, self.nodes, strict=True)
+        ]
+        return (pieces[0], pieces[1]), len(np.unique(group[self.open]))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from graspatlas import _core
+from graspatlas.collision.clash import Clash
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.callables import called_flags
 from graspatlas.grasps.grasp import Grasp
@@ -77,6 +78,29 @@ class Requirement(StatedRequirement):
             return lambda X: slacks(Grasps(problem, X, system))
 
         return [_core.slacks_measure(near), *tested(self, problem, system)]
+
+    def shortfalls(self, grasps: Grasps) -> Array:
+        """What each grasp lacks of the requirement (n,), in the measure that climbs follow; 0 where it is met.
+
+        It is of about the size of a tangent coordinate, and infinite where it cannot be measured.
+        """
+        return np.asarray(_core.missed(grasps.system, grasps.x, self.measures(grasps.problem, grasps.system)))
+
+    def lack(self, grasp: Grasps) -> str:
+        """What a grasp lacks of the requirement that rejects it, in words and figures; nothing where none are known.
+
+        Args:
+            grasp: A batch of one grasp.
+        """
+        return ""
+
+    def clash(self, grasp: Grasps) -> Clash | None:
+        """The two shapes that collide in a grasp, of a requirement that is about them.
+
+        Args:
+            grasp: A batch of one grasp, which the requirement rejects.
+        """
+        return None
 
 
 def tested(requirement: RequirementLike, problem: Problem, system: _core.GraspSystem) -> list[_core.Measure]:

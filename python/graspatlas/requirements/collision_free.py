@@ -9,6 +9,7 @@ import numpy as np
 
 from graspatlas import _core
 from graspatlas.collision.checker import CollisionChecker, collision_checker
+from graspatlas.collision.clash import Clash
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.problem.problem import Problem
 from graspatlas.requirements.base import Requirement, Slacks
@@ -52,6 +53,15 @@ class CollisionFree(Requirement):
         checker = self._checker(grasp.problem)
         pairs = np.argsort(checker.clearances(grasp.x)[0])[:NEAREST_PAIRS]
         return lambda grasps: (checker.clearances(grasps.x, pairs) - CLOSEST) / grasps.problem.length_scale
+
+    def lack(self, grasp: Grasps) -> str:
+        """Which bodies collide, and how deep; see :meth:`Requirement.lack`."""
+        clash = self.clash(grasp)
+        return clash.text if clash else ""
+
+    def clash(self, grasp: Grasps) -> Clash | None:
+        """The two shapes that miss their distance by most; see :meth:`Requirement.clash`."""
+        return self._checker(grasp.problem).worst(grasp.x[0])
 
     def _checker(self, problem: Problem) -> CollisionChecker:
         return collision_checker(problem, self.touch_depth, self.clearance)

@@ -57,10 +57,25 @@ class ForceClosure(Requirement):
         """The force-closure margin, negative where internal forces leave the cones, less the margin asked for."""
 
         def slacks(grasps: Grasps) -> Array:
-            signed = np.asarray(_core.force_closure_slacks(grasps.system, grasps.x, self.friction, self.torsional))
-            return np.maximum(signed, -1.0)[:, None] - self.margin
+            return np.maximum(self._signed(grasps), -1.0)[:, None] - self.margin
 
         return slacks
+
+    def lack(self, grasp: Grasps) -> str:
+        """The margin and the one asked for; see :meth:`Requirement.lack`."""
+        (signed,) = self._signed(grasp)
+        if not np.isfinite(signed):
+            return f"no internal forces press on the object, a margin of {self._asked} is required"
+        closure = "margin" if signed > 0.0 else "no force closure, margin"
+        return f"{closure} {signed:.3g}, {self._asked} is required"
+
+    @property
+    def _asked(self) -> str:
+        return f"{self.margin:g}" if self.margin > 0.0 else "more than 0"
+
+    def _signed(self, grasps: Grasps) -> Array:
+        """The force-closure margin, negative where internal forces leave the cones (n,)."""
+        return np.asarray(_core.force_closure_slacks(grasps.system, grasps.x, self.friction, self.torsional))
 
 
 def stated_friction(requirements: Sequence[object]) -> tuple[float, float] | None:

@@ -84,6 +84,11 @@ class HoldingForce(Requirement):
 
         return slacks
 
+    def lack(self, grasp: Grasps) -> str:
+        """The force that it withstands and the one asked for; see :meth:`Requirement.lack`."""
+        (force,) = self._forces(grasp, GAP)
+        return f"withstands {force:.3g} N, {self.at_least:g} N is required"
+
     @property
     def _limits(self) -> tuple[float, float | None, float, float]:
         """Friction, normal force, torsional friction and length that divides torques, as the index takes them."""

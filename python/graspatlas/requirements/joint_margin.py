@@ -50,3 +50,15 @@ class JointMargin(Requirement):
             return np.hstack([q[:, low] - lower[low], upper[high] - q[:, high]]) - self.distance
 
         return slacks
+
+    def lack(self, grasp: Grasps) -> str:
+        """The joint that is nearest to a limit; see :meth:`Requirement.lack`."""
+        lower, upper = grasp.problem.hand.joint_limits
+        gaps = {
+            (joint, end): float(gap[joint.q_index])
+            for end, gap in (("lower", grasp.q[0] - lower), ("upper", upper - grasp.q[0]))
+            for joint in grasp.problem.hand.model.hand_joints
+        }
+        (joint, end), gap = min(gaps.items(), key=lambda item: item[1])
+        unit = "m" if joint.prismatic else "rad"
+        return f"{joint.name} is {gap:.3g} {unit} from its {end} limit, {self.distance:g} {unit} is required"

@@ -20,6 +20,7 @@ from graspatlas.problem.problem import Problem
 from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.quality.evaluation import evaluate
 from graspatlas.requirements.base import RequirementLike
+from graspatlas.requirements.rejections import Rejection, nearest, rejections
 from graspatlas.requirements.screening import screen
 from graspatlas.result.gap import Gap, estimate_gap
 from graspatlas.result.refinement import Refinement
@@ -144,6 +145,28 @@ class GraspAtlas(Light):
         candidates = self.candidates()
         return self.grasp(int(candidates[np.argmin(self.qualities[candidates])]))
 
+    @cached_property
+    def nearest(self) -> Grasp | None:
+        """Where no chart meets the requirements, the grasp that comes nearest to it; None where one does.
+
+        It is the grasp that the fewest requirements reject, and of those the one with the least shortfall: see
+        :mod:`graspatlas.requirements.rejections`, and :meth:`rejections` for what it lacks.
+        """
+        if self.accepted.any():
+            return None
+        grasps = Grasps(self.problem, self.atlas.centers, self.system)
+        return self.grasp(nearest(self.requirements, grasps, self.qualities))
+
+    def rejections(self, chart: int) -> tuple[Rejection, ...]:
+        """Which requirements reject the grasp of a chart, by how much, which shapes collide; none if it is accepted.
+
+        Raises:
+            GraspAtlasError: If there is no such chart.
+        """
+        if self.accepted[self.checked_chart(chart)]:
+            return ()
+        return rejections(self.requirements, Grasps(self.problem, self.atlas.centers[chart], self.system))
+
     def candidates(self) -> IndexArray:
         """Charts that meet the requirements, ascending; at least one.
 
@@ -153,7 +176,8 @@ class GraspAtlas(Light):
         if not self.accepted.any():
             counts = ", ".join(f"{name} rejected {count}" for name, count in self.rejected.items())
             raise GraspAtlasError(
-                f"none of {self.atlas.n_charts} grasps meets the requirements ({counts}): relax a requirement"
+                f"none of {self.atlas.n_charts} grasps meets the requirements ({counts}): relax a requirement; "
+                "result.nearest is the grasp that comes nearest, and result.rejections says what it lacks"
             )
         return np.flatnonzero(self.accepted)
 

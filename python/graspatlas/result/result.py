@@ -21,6 +21,7 @@ from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.result.summary import (
     GapSummary,
     GraspSummary,
+    NearestSummary,
     OtherSummary,
     PeakSummary,
     RefinementSummary,
@@ -141,6 +142,8 @@ class Result(GraspAtlas):
             "best": _summary_of_grasp(best) if best else None,
             "gap": self._summary_of_gap(),
         }
+        if best is None and self.refinement is None:
+            summary["nearest"] = self._summary_of_nearest()
         if self.others:
             summary["others"] = self._summary_of_others(best)
         if self.refinement:
@@ -156,6 +159,18 @@ class Result(GraspAtlas):
             if len(left):
                 out[name]["largest"] = float(left.max())
         return out
+
+    def _summary_of_nearest(self) -> NearestSummary:
+        """The grasp that comes nearest to being accepted, and what it lacks."""
+        assert self.nearest is not None
+        chart = self.nearest.chart
+        return {
+            "chart": chart,
+            "rejected_by": [
+                {"requirement": rejection.requirement, "shortfall": _finite(rejection.shortfall), "why": rejection.why}
+                for rejection in self.rejections(chart)
+            ],
+        }
 
     def _summary_of_gap(self) -> GapSummary | None:
         """The gap; None where there is no best to compare with."""

@@ -10,9 +10,11 @@ __all__ = [
     "AuditSummary",
     "GapSummary",
     "GraspSummary",
+    "NearestSummary",
     "OtherSummary",
     "QualitySummary",
     "RefinementSummary",
+    "RejectionSummary",
     "ResultSummary",
     "SecondsSummary",
 ]
@@ -63,6 +65,21 @@ class GraspSummary(TypedDict):
     object_xyz: list[float]
     object_quat_xyzw: list[float]
     chart: int
+
+
+class RejectionSummary(TypedDict):
+    """What a requirement has against a grasp; the shortfall is None where it cannot be measured."""
+
+    requirement: str
+    shortfall: float | None
+    why: str
+
+
+class NearestSummary(TypedDict):
+    """The grasp that comes nearest to being accepted where none is."""
+
+    chart: int
+    rejected_by: list[RejectionSummary]
 
 
 class OtherSummary(TypedDict):
@@ -126,5 +143,6 @@ class ResultSummary(TypedDict):
     quality: QualitySummary
     best: GraspSummary | None
     gap: GapSummary | None
+    nearest: NotRequired[NearestSummary]
     others: NotRequired[dict[str, OtherSummary]]
     refined: NotRequired[RefinementSummary]

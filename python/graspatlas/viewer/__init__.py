@@ -31,8 +31,18 @@ __all__ = ["Shown", "export_html", "save_pads_picture", "save_picture", "save_pr
 Shown: TypeAlias = "Result | Path | Recording | Sequence[Recording]"
 
 
-def view(shown: Shown, *, open_browser: bool = True, wait: bool = True, host: str = "127.0.0.1") -> meshcat.Visualizer:
+def view(
+    shown: Shown,
+    *,
+    open_browser: bool = True,
+    wait: bool = True,
+    host: str = "127.0.0.1",
+    chart: int | None = None,
+    worst: bool = True,
+) -> meshcat.Visualizer:
     """Show the best and the worst grasp of a result side by side in a browser; or a path or trials, as a film.
+
+    Where no grasp of a result is accepted, the one that comes nearest to it is shown, with what it lacks.
 
     The page's address is printed to standard error. Meshcat's controls, top right, play a film and have its slider.
 
@@ -42,17 +52,21 @@ def view(shown: Shown, *, open_browser: bool = True, wait: bool = True, host: st
         wait: Whether to serve the page until Ctrl-C is pressed; otherwise it is served until the program ends.
         host: Address on which the page is served. By default only programs of this machine reach it; with
             ``"0.0.0.0"`` everyone who reaches the machine does, and nobody is asked for a password.
+        chart: The chart of a result whose grasp is shown, beside the best.
+        worst: Whether there is a second grasp: the worst beside the best, or the best beside a chart.
 
     Returns:
         Meshcat's visualizer, to add things to; its server, a thread of this program, has ended if `wait`.
 
     Raises:
-        GraspAtlasError: If a mesh cannot be read, or the page cannot be served on this address.
+        GraspAtlasError: If a mesh cannot be read, there is no such chart, or the page cannot be served on this address.
     """
+    from graspatlas.viewer.scene.scene import Scene
     from graspatlas.viewer.web.browser import show
 
     shown = _checked(shown)
-    told = shown if isinstance(shown, Result) else _film(shown)
+    _check_chart(shown, chart)
+    told = Scene(shown, worst=worst, chart=chart) if isinstance(shown, Result) else _film(shown)
     return show(told, open_browser=open_browser, wait=wait, host=host)
 
 
@@ -79,8 +93,7 @@ def export_html(shown: Shown | Scene, path: str | os.PathLike[str], *, chart: in
     from graspatlas.viewer.web.animation_page import film_page
 
     told = shown.result if isinstance(shown, Scene) else _checked(shown)
-    if chart is not None and not isinstance(told, GraspAtlas):
-        raise GraspAtlasError("a chart is opened in the page of a result; a film opens at a frame: path.html#frame=30")
+    _check_chart(told, chart)
     with replaced(path) as stream:
         text = explorer_page(told, chart) if isinstance(told, GraspAtlas) else film_page(_film(told))
         stream.write(text.encode("utf-8"))
@@ -93,10 +106,12 @@ def save_picture(
     width: int = 1600,
     height: int = 900,
     worst: bool = True,
+    chart: int | None = None,
 ) -> None:
     """Write a picture as a PNG file: best and worst grasp, six grasps of a path, or five moments of each trial.
 
-    It needs neither browser nor graphics card.
+    It needs neither browser nor graphics card. Where no grasp of a result is accepted, it shows the one that comes
+    nearest to it, and what that lacks.
 
     Args:
         shown: The result, a path of grasps, or what :func:`graspatlas.record` recorded: one trial, or a list of them.
@@ -104,10 +119,12 @@ def save_picture(
         path: Such as ``"can.png"``; an existing file is replaced.
         width: Width in pixels, at least 320.
         height: Height in pixels, at least 180.
-        worst: Whether the worst grasp stands beside the best; only of a result.
+        worst: Whether there is a second grasp: the worst beside the best, or the best beside a chart; only of a result.
+        chart: The chart of a result whose grasp is shown, beside the best.
 
     Raises:
-        GraspAtlasError: If the size is too small, a mesh cannot be read or the file cannot be written.
+        GraspAtlasError: If the size is too small, there is no such chart, a mesh cannot be read or the file cannot be
+            written.
     """
     from graspatlas.storage.files import replaced
     from graspatlas.viewer.films.path_film import path_film
@@ -119,8 +136,9 @@ def save_picture(
     _check_png(path)
     check_size(width, height)
     shown = shown if isinstance(shown, Scene) else _checked(shown)
+    _check_chart(shown, chart)
     with replaced(path) as stream:
-        shown = Scene(shown, worst=worst) if isinstance(shown, Result) else shown
+        shown = Scene(shown, worst=worst, chart=chart) if isinstance(shown, Result) else shown
         if isinstance(shown, Scene):
             image = draw(shown, width, height)
         elif isinstance(shown, Path):
@@ -187,6 +205,14 @@ def _save_marked(make: Callable[[], Marked], path: str | os.PathLike[str], width
 def _check_png(path: str | os.PathLike[str]) -> None:
     if os.path.splitext(path)[1].lower() != ".png":
         raise GraspAtlasError(f"a picture's name must end in .png, not '{os.fspath(path)}'")
+
+
+def _check_chart(shown: object, chart: int | None) -> None:
+    """Make sure that a chart is one of a result."""
+    if chart is not None and not isinstance(shown, GraspAtlas):
+        raise GraspAtlasError(
+            "only a result has charts to be shown; a film opens at a frame: path.html#frame=30, and a scene as it is"
+        )
 
 
 def _film(shown: Path | list[Recording]) -> Film:

@@ -45,6 +45,11 @@ def chart_named(result: Result, name: str) -> int:
         return 0
     if name in ("best", "worst"):
         return int(getattr(result, name).chart)
+    if name == "nearest":
+        return int((result.nearest or result.best).chart)
     if name.isascii() and name.isdigit() and len(name) <= LONGEST_NUMBER:
         return int(name)
-    raise GraspAtlasError(f"{shown(name)} names no grasp; give the number of a chart, or first, best or worst")
+    raise GraspAtlasError(
+        f"{shown(name)} names no grasp; give the number of a chart, 0 to {result.atlas.n_charts - 1}, or first, best, "
+        "worst or nearest"
+    )

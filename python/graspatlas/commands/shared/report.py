@@ -58,7 +58,7 @@ def result_lines(result: Result, folder: Path | None) -> list[str]:
     elif result.refinement:
         lines.append("  none of the charts meets the requirements, but grasps with other hand motions do:")
     else:
-        lines.append("  no best grasp: relax a requirement, or search among all motions: --motions all")
+        lines += [*_nearest_lines(result), "  relax a requirement, or search among all motions: --motions all"]
     if result.refinement:
         lines += _refined_lines(result)
     if summary["gap"]:
@@ -69,6 +69,14 @@ def result_lines(result: Result, folder: Path | None) -> list[str]:
     if folder:
         lines.append(f"  written to {folder}; look at it with: graspatlas view {folder}")
     return lines
+
+
+def _nearest_lines(result: Result) -> list[str]:
+    """Where no grasp is accepted, the one that comes nearest, and what it lacks."""
+    nearest = result.nearest
+    assert nearest is not None
+    lines = [f"  no best grasp; nearest to one is chart {nearest.chart}, rejected by"]
+    return lines + [f"    {rejection}" for rejection in result.rejections(nearest.chart)]
 
 
 def _gap_line(gap: GapSummary, n_charts: int) -> str:

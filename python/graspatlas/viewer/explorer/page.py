@@ -14,6 +14,8 @@ from string import Template
 
 import numpy as np
 
+from graspatlas.collision.clash import Clash
+from graspatlas.grasps.grasp import Grasp
 from graspatlas.result.exports import identity
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.support.arrays import Array
@@ -21,10 +23,11 @@ from graspatlas.support.validation import PlainTable
 from graspatlas.viewer.explorer.charts import Charts
 from graspatlas.viewer.explorer.layout import write_layout
 from graspatlas.viewer.explorer.numbers import Numbers
-from graspatlas.viewer.explorer.shapes import write_shapes
+from graspatlas.viewer.explorer.shapes import write_clash, write_shapes
 from graspatlas.viewer.explorer.words import index_tables, requirement_label
 from graspatlas.viewer.scene.bodies import BodyShapes
-from graspatlas.viewer.scene.captions import index_name, legend, subtitle
+from graspatlas.viewer.scene.captions import index_name, legend, rejected_by, subtitle
+from graspatlas.viewer.scene.clashing import WIDTH
 from graspatlas.viewer.scene.scene import (
     COLOURS,
     CONTACT_RADIUS,
@@ -33,6 +36,7 @@ from graspatlas.viewer.scene.scene import (
     NORMAL_LENGTH,
     NORMAL_RADIUS,
     body_parts,
+    clash_of,
     direction_to,
     outermost,
     size_of,
@@ -73,8 +77,10 @@ def explorer_page(result: GraspAtlas, chart: int | None = None) -> str:
         GraspAtlasError: If a mesh of the hand or the object cannot be read, or there is no such chart.
     """
     numbers = Numbers()
-    facts = _facts(result, numbers)
-    facts["opens_at"] = None if chart is None else result.checked_chart(chart)
+    nearest = None if result.refinement or result.nearest is None else int(result.nearest.chart)
+    opens_at = nearest if chart is None else result.checked_chart(chart)
+    facts = _facts(result, numbers, opens_at)
+    facts["opens_at"], facts["nearest"] = opens_at, nearest
     facts["numbers"] = numbers.entries  # type: ignore[assignment]  # plain data, but typed more closely
     files = resources.files("graspatlas.viewer.explorer")
     scripts = [(files / "scripts" / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS]
@@ -99,16 +105,25 @@ def _extremes(result: GraspAtlas) -> str:
         grasps += [] if grasps else [("best", result.best)]
         grasps.append(("worst", result.worst))
     if not grasps:
-        return "no grasp meets the requirements"
+        nearest = result.nearest
+        assert nearest is not None
+        why = "; ".join(rejected_by(result.rejections(nearest.chart)))
+        return f"no grasp meets the requirements, nearest is chart {nearest.chart}: {why}"
     places = [f" (chart {grasp.chart})" if grasp.chart >= 0 else "" for _, grasp in grasps]
     values = ", ".join(f"{name} {g.quality:.3g}{place}" for (name, g), place in zip(grasps, places, strict=True))
     return f"{index_name(result)}: {values}"
 
 
-def _facts(result: GraspAtlas, numbers: Numbers) -> PlainTable:
-    """What the page knows besides its numbers, which it writes."""
+def _facts(result: GraspAtlas, numbers: Numbers, opens_at: int | None) -> PlainTable:
+    """What the page knows besides its numbers, which it writes; of the chart that it opens at also what it lacks."""
     problem, charts = result.problem, Charts(result)
     shapes = BodyShapes(problem)
+    rejected = () if opens_at is None else result.rejections(opens_at)
+    clash = clash_of(rejected)
+    shown = [result.best, result.worst] if result.accepted.any() else [result.at_x1]
+    if result.refinement:
+        shown[0] = result.refined_best
+    size = size_of(body_parts(shapes, shown[0]))
     charts.write(numbers)
     maxima = result.refinement.x[: charts.n_maxima] if result.refinement else result.atlas.centers[:0]
     requirements, _ = charts.rejections
@@ -142,9 +157,17 @@ def _facts(result: GraspAtlas, numbers: Numbers) -> PlainTable:
         ],
         "friction": friction,
         "torsional": torsional,
-        "shapes": write_shapes(problem, shapes, numbers),
+        "shapes": write_shapes(problem, shapes, numbers, clash),
+        "rejected": {
+            "chart": opens_at,
+            "lines": rejected_by(rejected),
+            "stripes": write_clash(clash, shapes, numbers, size * WIDTH) if clash else [],
+            "point": clash.point.tolist() if clash and np.isfinite(clash.point).all() else None,
+        },
         "layout": write_layout(result.atlas, maxima, numbers),
-        "view": _view(result, shapes),
+        "view": _view(
+            shapes, shown, size, None if clash is None or opens_at is None else (result.grasp(opens_at), clash)
+        ),
         "colours": {name: list(colour) for name, colour in COLOURS.items()},
         "legend": [{"colour": list(colour), "text": text} for colour, text in legend()],
         "file": identity(result),
@@ -166,19 +189,26 @@ def _maxima(result: GraspAtlas, count: int) -> list[PlainTable]:
     ]
 
 
-def _view(result: GraspAtlas, shapes: BodyShapes) -> PlainTable:
-    """From where hand and object are seen, what must be in sight, and how large marks are."""
-    grasps = [result.best, result.worst] if result.accepted.any() else [result.at_x1]
-    if result.refinement:
-        grasps[0] = result.refined_best
-    size = size_of(body_parts(shapes, grasps[0]))
+def _view(shapes: BodyShapes, grasps: list[Grasp], size: float, clashing: tuple[Grasp, Clash] | None) -> PlainTable:
+    """From where hand and object are seen, what must be in sight, and how large marks are.
+
+    Args:
+        shapes: Meshes of the problem.
+        grasps: What must be in sight.
+        size: Scale of the marks.
+        clashing: A grasp that is looked at for its shapes that collide.
+    """
     parts = [upright_parts(shapes, grasp, size)[0] for grasp in grasps]
-    subjects = [subject_of(some, grasp, size) for some, grasp in zip(parts, grasps, strict=True)]
+    subjects = [subject_of(some, size) for some in parts]
+    if clashing is not None:
+        grasp, clash = clashing
+        parts.append(upright_parts(shapes, grasp, size, clash)[0])
+        subjects = [subject_of(parts[-1], size, clash)]
     points: Array = np.concatenate([vertices_of(some, ("hand", "object", "normal")) for some in parts])
-    up = up_of_object(result.problem)
+    up = up_of_object(shapes.problem)
     return {
         "up": None if up is None else up.tolist(),
-        "direction": direction_to(subjects, result.problem.object_joint_model).tolist(),
+        "direction": direction_to(subjects, shapes.problem.object_joint_model).tolist(),
         "points": outermost(points).round(4).ravel().tolist(),
         "contact_radius": size * CONTACT_RADIUS,
         "normal": [size * NORMAL_LENGTH, size * NORMAL_RADIUS],

@@ -52,7 +52,7 @@ def path_film(path: Path, frames: int = MAX_FRAMES) -> Film:
     parts = shots[0] + _marks(grasps[0], size)
     S = np.diag([1.0 / size, 1.0 / size, 1.0 / size, 1.0])
     T = S @ np.array([[p.T for p in shot] + _mark_placements(grasp) for shot, grasp in zip(shots, grasps, strict=True)])
-    subjects = [subject_of(shots[i] + _marks(grasps[i], size), grasps[i], size) for i in (0, -1)]
+    subjects = [subject_of(shots[i] + _marks(grasps[i], size), size) for i in (0, -1)]
     arc_lengths = path.arc_length[points]
     return Film(
         name=path.result.problem.name,

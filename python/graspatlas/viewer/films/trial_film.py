@@ -149,7 +149,7 @@ class _Show:
     def subject(self) -> Subject:
         """What the camera should see of it: the grasp."""
         parts = grasp_parts(BodyShapes(self.recording.grasp.problem), self.recording.grasp, self.size)[0]
-        return subject_of(parts, self.recording.grasp, self.size)
+        return subject_of(parts, self.size)
 
     def points(self) -> Array:
         """Vertices of hand and object in some frames (n, 3), in the palm's frame."""

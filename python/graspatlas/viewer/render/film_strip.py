@@ -11,7 +11,7 @@ from PIL import Image
 from graspatlas.support.progress import counted
 from graspatlas.viewer.films.animation import Film, Readout
 from graspatlas.viewer.render.picture import painted
-from graspatlas.viewer.render.text_images import DARK, GREY, legend_image, text_image
+from graspatlas.viewer.render.text_images import ALARM, DARK, GREY, legend_image, text_image
 from graspatlas.viewer.scene.camera import Camera
 from graspatlas.viewer.scene.scene import fitted_camera
 
@@ -27,8 +27,6 @@ SEAM, PAPER = 4, (255, 255, 255)
 HEAD, FOOT = 0.055, 0.05
 #: Where the words are in each picture, from its top.
 WORDS = 0.88
-#: Colour of what is wrong.
-ALARM = (192, 0, 32)
 
 
 def draw_strip(film: Film, width: int, height: int) -> Image.Image:

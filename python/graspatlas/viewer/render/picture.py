@@ -1,7 +1,8 @@
-"""A picture of the best grasp, or of the best and the worst, drawn without browser, graphics card or display."""
+"""A picture of the best grasp, or of the best and another, drawn without browser, graphics card or display."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,9 +13,9 @@ from graspatlas.errors import GraspAtlasError
 from graspatlas.support.arrays import Float32Array
 from graspatlas.viewer.render.raster import Fragments, in_front_of, nearest
 from graspatlas.viewer.render.shading import FloorShadow, Shadow, crevices, lamps, to_linear
-from graspatlas.viewer.render.text_images import GREY, caption_image, legend_image, text_image
+from graspatlas.viewer.render.text_images import GREY, LINE, SMALL, caption_image, legend_image, text_image
 from graspatlas.viewer.scene.camera import Camera
-from graspatlas.viewer.scene.captions import caption, legend, subtitle
+from graspatlas.viewer.scene.captions import Caption, caption, scene_legend, subtitle
 from graspatlas.viewer.scene.scene import SHOW_THROUGH, Part, Scene
 
 __all__ = ["check_size", "draw", "painted"]
@@ -32,6 +33,8 @@ SAMPLES = 2
 COARSE = 4
 #: Where the grasps are in the picture, which spans -1 to 1: left, right, bottom, top.
 WINDOW = (-0.88, 0.88, -0.54, 0.86)
+#: Where captions begin, from the top, as a share of the height.
+CAPTION_TOP = 0.782
 #: Screen colours of the background, at the top and at the bottom.
 BACKGROUND = ((0.985, 0.988, 0.992), (0.855, 0.868, 0.885))
 #: Share of the light that the darkest crevice loses.
@@ -56,9 +59,14 @@ def check_size(width: int, height: int) -> None:
 
 def draw(scene: Scene, width: int, height: int) -> Image.Image:
     """The picture of a scene, with captions."""
-    camera = scene.camera(width / height, WINDOW)
+    words = [caption(scene.result, exhibit) for exhibit in scene.exhibits]
+    size = min(height / 22.0, width / max(LEGEND_LETTERS, CAPTION_LETTERS * len(words)))
+    more = (max(w.rows for w in words) - 1) * LINE * SMALL * size  # pixels of lines that captions usually have not
+    left, right, bottom, top = WINDOW
+    camera = scene.camera(width / height, (left, right, bottom + 2.0 * more / height, top))
     image = painted([part for exhibit in scene.exhibits for part in exhibit.parts], camera, width, height)
-    _write(image, scene, camera)
+    _write_captions(image, scene, camera, words, size, CAPTION_TOP * height - more)
+    _write_legend(image, scene, size)
     return image
 
 
@@ -68,20 +76,26 @@ def painted(parts: list[Part], camera: Camera, width: int, height: int) -> Image
     return Image.fromarray(_core.developed(painter.paint(), width, height, SAMPLES))
 
 
-def _write(image: Image.Image, scene: Scene, camera: Camera) -> None:
-    """Put captions under the grasps, the legend at the foot and the subtitle at the head."""
+def _write_captions(
+    image: Image.Image, scene: Scene, camera: Camera, words: Sequence[Caption], size: float, top: float
+) -> None:
+    """Put captions under the grasps, from a row of pixels on."""
     width, height = image.size
-    size = min(height / 22.0, width / max(LEGEND_LETTERS, CAPTION_LETTERS * len(scene.exhibits)))
-    words = [caption(scene.result, exhibit) for exhibit in scene.exhibits]
     seen = [camera.project(exhibit.points, width / height)[:, 0] for exhibit in scene.exhibits]
     middles = [width * float(x.min() + x.max() + 2.0) / 4.0 for x in seen]
     room = min([*np.diff(middles), 2.0 * middles[0], 2.0 * (width - middles[-1])]) - size
     widest = max(caption_image(w, size).width for w in words)
     for middle, w in zip(middles, words, strict=True):
         text = caption_image(w, size * min(1.0, room / widest))
-        image.paste(text, (int(middle - text.width / 2.0), int(0.782 * height)), text)
-    foot = legend_image(legend(), 0.54 * size)
-    image.paste(foot, ((width - foot.width) // 2, int(height - 1.65 * foot.height)), foot)
+        image.paste(text, (int(middle - text.width / 2.0), int(top)), text)
+
+
+def _write_legend(image: Image.Image, scene: Scene, size: float) -> None:
+    """Put the legend at the foot and the subtitle at the head."""
+    width, height = image.size
+    entries, letters = scene_legend(scene), 0.54 * size
+    foot = legend_image(entries, letters * min(1.0, 0.96 * width / legend_image(entries, letters).width))
+    image.paste(foot, ((width - foot.width) // 2, int(height - 1.72 * letters - 0.5 * foot.height)), foot)
     head = text_image([(subtitle(scene.result), 0.58 * size, GREY)])
     image.paste(head, (int(0.8 * size), int(0.7 * size)), head)
 

@@ -7,11 +7,17 @@ from PIL import Image, ImageDraw, ImageFont
 from graspatlas.viewer.scene.captions import Caption
 from graspatlas.viewer.scene.scene import Colour
 
-__all__ = ["DARK", "GREY", "caption_image", "legend_image", "text_image"]
+__all__ = ["ALARM", "DARK", "GREY", "LINE", "SMALL", "caption_image", "legend_image", "text_image"]
 
 #: Colours of the text.
 DARK = (28, 34, 44)
 GREY = (92, 100, 112)
+#: That of what is wrong.
+ALARM = (176, 0, 28)
+
+
+#: Height of the letters below a title and an index, as a share of the title's, and of a line as one of its letters'.
+SMALL, LINE = 0.58, 1.32
 
 
 def text_image(lines: list[tuple[str, float, tuple[int, int, int]]]) -> Image.Image:
@@ -22,22 +28,22 @@ def text_image(lines: list[tuple[str, float, tuple[int, int, int]]]) -> Image.Im
     """
     fonts = [ImageFont.load_default(size=max(size, 6.0)) for _, size, _ in lines]
     widths = [font.getlength(text) for (text, _, _), font in zip(lines, fonts, strict=True)]
-    width, height = int(max(widths)) + 8, int(sum(1.32 * size for _, size, _ in lines)) + 4
+    width, height = int(max(widths)) + 8, int(sum(LINE * size for _, size, _ in lines)) + 4
     # Transparent pixels have the colour of the text: no dark seam where they are blended.
     image = Image.new("RGBA", (width, height), (*GREY, 0))
     pen = ImageDraw.Draw(image)
     y = 0.0
     for (text, size, colour), font, length in zip(lines, fonts, widths, strict=True):
         pen.text(((width - length) / 2.0, y), text, font=font, fill=(*colour, 255))
-        y += 1.32 * size
+        y += LINE * size
     return image
 
 
 def caption_image(words: Caption, size: float) -> Image.Image:
     """A caption; `size` is the height of its title in pixels."""
-    return text_image(
-        [(words.title, size, DARK), (words.quality, 0.68 * size, DARK), (words.motion, 0.58 * size, GREY)]
-    )
+    lines = [(words.title, size, DARK), (words.quality, 0.68 * size, DARK)]
+    lines += [(words.motion, SMALL * size, GREY)] if words.motion else []
+    return text_image(lines + [(alarm, SMALL * size, ALARM) for alarm in words.alarms])
 
 
 def legend_image(entries: list[tuple[Colour, str]], size: float) -> Image.Image:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -23,6 +23,8 @@ __all__ = ["BodyMeshes", "BodyShapes"]
 
 #: Red, green, blue and opacity of obstacles.
 OBSTACLE = (0.36, 0.50, 0.62, 0.30)
+#: Opacity of what stands back behind something else that is shown.
+FADED = 0.16
 #: Side of the plates that stand for planes, as a multiple of the object's diagonal; their thickness as a share of that.
 PLATE, THIN = 1.2, 0.01
 
@@ -55,9 +57,11 @@ class BodyMeshes:
         self._files: dict[tuple[str | float, ...], Mesh | None] = {}
         self.parts = self._read(body)
 
-    def on_links(self, placements: Mapping[str, Array]) -> Iterator[Shape]:
-        """The meshes with the links at some placements (4, 4)."""
-        return ((part.mesh, placements[part.link] @ part.T_link_shape, part.colour) for part in self.parts)
+    def on_links(self, placements: Mapping[str, Array], faded: Collection[str] = ()) -> Iterator[Shape]:
+        """The meshes with the links at some placements (4, 4), those of some links faded."""
+        for part in self.parts:
+            colour = (*part.colour[:3], FADED) if part.link in faded else part.colour
+            yield part.mesh, placements[part.link] @ part.T_link_shape, colour
 
     def at_rest(self) -> Iterator[Shape]:
         """The meshes with all joints at 0, in the frame of the root."""
@@ -103,35 +107,40 @@ class BodyShapes:
     """
 
     def __init__(self, problem: Problem) -> None:
-        self._problem = problem
+        self.problem = problem
         self._hand, self._object = BodyMeshes(problem.hand), BodyMeshes(problem.object)
         self._obstacles: dict[str, BodyMeshes] = {}
 
-    def hand(self, q: Array) -> Iterator[Shape]:
-        """The hand at joint configuration q (nq,)."""
+    def hand(self, q: Array, faded: Collection[str] = ()) -> Iterator[Shape]:
+        """The hand at joint configuration q (nq,), some of its links faded."""
         if not self._hand.parts:
-            return bones(self._problem, q)
-        return self._hand.on_links(self._problem.hand.link_placements(q))
+            return bones(self.problem, q)
+        return self._hand.on_links(self.problem.hand.link_placements(q), faded)
 
     @property
     def has_hand(self) -> bool:
         """Whether the hand has meshes, and is not sketched."""
         return bool(self._hand.parts)
 
-    def carried(self) -> Iterator[tuple[Mesh, int, Array, tuple[float, float, float, float]]]:
-        """Meshes of the hand, the joint that carries each (0 is the palm), its placement there, and its colour."""
+    def carried(self) -> Iterator[tuple[str, Mesh, int, Array, tuple[float, float, float, float]]]:
+        """Link and mesh of the hand, the joint that carries it (0 is the palm), its placement there, and its colour."""
         for part in self._hand.parts:
-            joint, T_joint_link = self._problem.hand.frame(part.link)
-            yield part.mesh, joint, T_joint_link @ part.T_link_shape, part.colour
+            joint, T_joint_link = self.problem.hand.frame(part.link)
+            yield part.link, part.mesh, joint, T_joint_link @ part.T_link_shape, part.colour
 
     def object(self) -> Iterator[Shape]:
         """The object in its own frame."""
-        return self._object.at_rest() if self._object.parts else outlines(self._problem)
+        return self._object.at_rest() if self._object.parts else outlines(self.problem)
 
-    def obstacles(self, frame: str) -> Iterator[Shape]:
-        """The obstacles that are fixed to the ``"object"`` or the ``"palm"``, there; of planes a plate below them."""
-        for obstacle in self._problem.obstacles:
-            if obstacle.frame != frame:
+    def obstacles(self, frame: str, names: Collection[str] | None = None) -> Iterator[Shape]:
+        """The obstacles that are fixed to the ``"object"`` or the ``"palm"``, there; of planes a plate below them.
+
+        Args:
+            frame: What they are fixed to.
+            names: Only those of these names; all by default.
+        """
+        for obstacle in self.problem.obstacles:
+            if obstacle.frame != frame or (names is not None and obstacle.name not in names):
                 continue
             T = obstacle.T_frame_shape
             if obstacle.body is None:

@@ -2,20 +2,36 @@
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from graspatlas.paths.path import GraspPath
 from graspatlas.quality.batched import quality_name
 from graspatlas.quality.evaluation import INDICES
 from graspatlas.requirements.base import requirement_name
+from graspatlas.requirements.rejections import Rejection
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.simulation.recording import Recording
-from graspatlas.viewer.scene.scene import COLOURS, Colour, Exhibit
+from graspatlas.viewer.scene.clashing import RED
+from graspatlas.viewer.scene.scene import COLOURS, Colour, Exhibit, Scene
 
-__all__ = ["Caption", "caption", "index_name", "legend", "path_text", "subtitle", "trial_text"]
+__all__ = [
+    "Caption",
+    "caption",
+    "index_name",
+    "legend",
+    "path_text",
+    "rejected_by",
+    "scene_legend",
+    "subtitle",
+    "trial_text",
+]
 
 #: Motions below this are rounding [mm per rad].
 ROUNDING = 1e-6
+#: Letters in a line of what requirements have against a grasp.
+LETTERS_A_LINE = 46
 
 
 @dataclass(frozen=True)
@@ -26,26 +42,48 @@ class Caption:
         title: Such as ``Best grasp``.
         quality: The quality index in words, and its value.
         motion: How far the object moves when the joints turn by one radian (root of the sum of squares): semi-axes.
+            Nothing where shapes that collide are drawn in place of that.
+        alarms: What requirements have against it, in lines.
     """
 
     title: str
     quality: str
-    motion: str
+    motion: str = ""
+    alarms: tuple[str, ...] = ()
+
+    @property
+    def rows(self) -> int:
+        """Lines below the title and the index."""
+        return len(self.alarms) + bool(self.motion)
 
 
 def caption(result: GraspAtlas, exhibit: Exhibit) -> Caption:
     """What is written beside one of the grasps."""
     axes = [1000.0 * axis for axis in exhibit.semi_axes[: result.problem.object_joint_model.translations]]
     reach = ", ".join(f"{axis if axis > ROUNDING else 0.0:.3g}" for axis in axes)
-    moves = max(axes) > ROUNDING
+    motion = f"object moves {reach} mm per rad" if max(axes) > ROUNDING else "the joints do not move the object"
     return Caption(
         title=_title(result, exhibit),
         quality=f"{index_name(result)} {exhibit.grasp.quality:.3g}",
-        motion=f"object moves {reach} mm per rad" if moves else "the joints do not move the object",
+        motion="" if exhibit.clash else motion,
+        alarms=tuple(line for text in rejected_by(exhibit.rejections) for line in textwrap.wrap(text, LETTERS_A_LINE)),
     )
 
 
+def rejected_by(rejections: Sequence[Rejection]) -> list[str]:
+    """What requirements have against a grasp, in words, one text each."""
+    texts = []
+    for rejection in rejections:
+        name = rejection.requirement.split(":")[0].replace("_", " ")
+        texts.append(f"rejected by {name}: {rejection.why}" if rejection.why else f"rejected by {name}")
+    return texts
+
+
 def _title(result: GraspAtlas, exhibit: Exhibit) -> str:
+    if exhibit.name == "nearest":
+        return f"No grasp is accepted; nearest is chart {exhibit.grasp.chart}"
+    if exhibit.name == "chart":
+        return f"Chart {exhibit.grasp.chart}" + (", rejected" if exhibit.rejections else "")
     free = result.refinement is not None and result.refinement.all_motions
     return f"{exhibit.name.capitalize()} grasp" + (", all motions free" if free and exhibit.name == "best" else "")
 
@@ -65,6 +103,17 @@ def subtitle(result: GraspAtlas) -> str:
         names = ", ".join(requirement_name(r).split(":")[0].replace("_", " ") for r in result.requirements)
         those = f"; {result.accepted.sum()} meet {names}"
     return f"{result.problem.name}: atlas of {result.atlas.n_charts} charts, {result.status}{those}{unit}"
+
+
+def scene_legend(scene: Scene) -> list[tuple[Colour, str]]:
+    """Colours of a scene and what they stand for, those that are in it."""
+    groups = {part.group for exhibit in scene.exhibits for part in exhibit.parts}
+    entries = [
+        (colour, text) for colour, text in legend() if any(COLOURS[group] == colour for group in groups & {*COLOURS})
+    ]
+    if any(exhibit.clash for exhibit in scene.exhibits):
+        entries.append((RED, "striped: shapes that collide"))
+    return entries + ([(COLOURS["clash"], "where they are deepest, or nearest")] if "clash" in groups else [])
 
 
 def path_text(path: GraspPath) -> str:

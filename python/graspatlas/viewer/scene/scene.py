@@ -1,21 +1,25 @@
-"""What the viewers show: the best grasp, the worst beside it, as coloured meshes, and where to look from."""
+"""What the viewers show: the best grasp, and another beside it, as coloured meshes, and where to look from."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from graspatlas.collision.clash import Clash
 from graspatlas.collision.hulls import hull_of
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasp import Grasp
 from graspatlas.problem.object_joint import ObjectJoint
 from graspatlas.problem.problem import Problem
+from graspatlas.requirements.rejections import Rejection
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.support.arrays import Array
-from graspatlas.viewer.scene.bodies import BodyShapes
+from graspatlas.viewer.scene.bodies import FADED, BodyShapes
 from graspatlas.viewer.scene.camera import Camera
+from graspatlas.viewer.scene.clashing import STRIPES, WIDTH, in_stripes, names_of
 from graspatlas.viewer.scene.meshes import Mesh, arrow, ellipsoid, merged
 from graspatlas.viewer.scene.velocity_ellipsoid import velocity_ellipsoid
 from graspatlas.viewer.scene.viewpoint import Subject, best_direction
@@ -28,6 +32,7 @@ __all__ = [
     "Part",
     "Scene",
     "body_parts",
+    "clash_of",
     "direction_to",
     "fitted_camera",
     "grasp_parts",
@@ -52,6 +57,7 @@ COLOURS: dict[str, Colour] = {
     "push": (0.56, 0.20, 0.88, 1.0),
     "pad": (0.02, 0.50, 0.46, 1.0),
     "object normal": (0.10, 0.30, 0.85, 1.0),
+    "clash": (0.06, 0.07, 0.10, 1.0),
 }
 #: How much of them shows through what hides them.
 SHOW_THROUGH = {
@@ -62,6 +68,7 @@ SHOW_THROUGH = {
     "push": 0.7,
     "pad": 0.35,
     "object normal": 0.8,
+    "clash": 0.55,
 }
 #: Sizes of contact points and arrows, and the longest semi-axis that an ellipsoid is drawn with [m].
 CONTACT_RADIUS = 0.0042
@@ -102,16 +109,23 @@ class Exhibit:
     """One grasp as it is shown.
 
     Attributes:
-        name: ``best`` or ``worst``.
+        name: ``best``, ``worst``, ``chart`` for one that was chosen, or ``nearest`` to being accepted.
         grasp: The grasp.
         parts: Its meshes, placed in the world.
         semi_axes: Semi-axes of the object's velocity ellipsoid, longest first (3,), metres a radian.
+        rejections: What requirements have against it.
     """
 
     name: str
     grasp: Grasp
     parts: tuple[Part, ...]
     semi_axes: Array
+    rejections: tuple[Rejection, ...] = ()
+
+    @property
+    def clash(self) -> Clash | None:
+        """The two shapes that collide, where a requirement rejects it for that."""
+        return clash_of(self.rejections)
 
     @cached_property
     def points(self) -> Array:
@@ -120,34 +134,40 @@ class Exhibit:
 
 
 class Scene:
-    """The best grasp on the left, the worst on the right, seen from one direction.
+    """The best grasp on the left, the worst or one that was chosen on the right, seen from one direction.
+
+    Where no grasp is accepted, the one that comes nearest to it stands for the best, and what it lacks is shown: shapes
+    that collide in stripes.
 
     The palm is as in its own frame, unless the object stands on a plane: that one is level then.
 
     Args:
         result: The result.
-        worst: Whether the worst grasp is shown.
+        worst: Whether a second grasp is shown: the worst beside the best, or the best beside a chart.
+        chart: The chart whose grasp is shown, in place of the worst.
 
     Raises:
-        GraspAtlasError: If a mesh of the hand or the object cannot be read.
+        GraspAtlasError: If a mesh of the hand or the object cannot be read, or there is no such chart.
     """
 
-    def __init__(self, result: GraspAtlas, *, worst: bool = True) -> None:
+    def __init__(self, result: GraspAtlas, *, worst: bool = True, chart: int | None = None) -> None:
         self.result = result
         shapes = BodyShapes(result.problem)
-        best = result.refined_best if result.refinement else result.best
-        grasps = [("best", best)]
-        if worst and result.accepted.any():
-            grasps.append(("worst", result.worst))
-        size = size_of(body_parts(shapes, best))
-        sides = [(name, grasp, *upright_parts(shapes, grasp, size)) for name, grasp in grasps]
-        subjects = [subject_of(parts, grasp, size) for _, grasp, parts, _ in sides]
+        grasps = _shown(result, worst, chart)
+        size = size_of(body_parts(shapes, grasps[0][1]))
+        sides, subjects = [], []
+        for name, grasp in grasps:
+            rejections = result.rejections(grasp.chart) if name in ("chart", "nearest") else ()
+            clash = clash_of(rejections)
+            parts, semi_axes = upright_parts(shapes, grasp, size, clash)
+            sides.append((name, grasp, parts, semi_axes, rejections))
+            subjects.append(subject_of(parts, size, clash))
         self.direction = direction_to(subjects, result.problem.object_joint_model)
         right = Camera(np.zeros(3), self.direction, 1.0).axes[0]
-        #: Best, then worst.
+        #: The best first.
         self.exhibits = tuple(
-            Exhibit(name, grasp, _side(parts, right, sign, size), semi_axes)
-            for (name, grasp, parts, semi_axes), sign in zip(sides, (-1.0, 1.0), strict=False)
+            Exhibit(name, grasp, _side(parts, right, sign, size), semi_axes, rejections)
+            for (name, grasp, parts, semi_axes, rejections), sign in zip(sides, (-1.0, 1.0), strict=False)
         )
 
     def camera(self, aspect: float, window: tuple[float, float, float, float]) -> Camera:
@@ -159,6 +179,26 @@ class Scene:
         """
         points = np.concatenate([exhibit.points for exhibit in self.exhibits])
         return fitted_camera(points, self.direction, aspect, window)
+
+
+def _shown(result: GraspAtlas, second: bool, chart: int | None) -> list[tuple[str, Grasp]]:
+    """The grasps that are shown, and what each is: the best, unless a chart is shown alone, and perhaps another."""
+    best = result.refined_best if result.refinement else None if result.nearest else result.best
+    if chart is not None:
+        chosen = ("chart", result.grasp(chart))
+        if best is None or not second:
+            return [chosen]
+        is_best = not result.refinement and chosen[1].chart == best.chart
+        return [("best", best)] if is_best else [("best", best), chosen]
+    if best is None:
+        assert result.nearest is not None
+        return [("nearest", result.nearest)]
+    return [("best", best), *([("worst", result.worst)] if second and result.accepted.any() else [])]
+
+
+def clash_of(rejections: tuple[Rejection, ...]) -> Clash | None:
+    """The shapes that collide, where one of the rejections is for that."""
+    return next((rejection.clash for rejection in rejections if rejection.clash), None)
 
 
 def direction_to(subjects: list[Subject], joint: ObjectJoint) -> Array:
@@ -191,35 +231,65 @@ def outermost(points: Array) -> Array:
         return points
 
 
-def body_parts(shapes: BodyShapes, grasp: Grasp) -> list[Part]:
-    """Hand, object and obstacles of a grasp, in the palm's frame."""
-    parts = [Part("hand", mesh, T, colour) for mesh, T, colour in shapes.hand(grasp.q)]
-    parts += [Part("object", mesh, grasp.T_palm_object @ T, colour) for mesh, T, colour in shapes.object()]
-    return parts + obstacle_parts(shapes, grasp.T_palm_object)
+def body_parts(shapes: BodyShapes, grasp: Grasp, clash: Clash | None = None) -> list[Part]:
+    """Hand, object and obstacles of a grasp, in the palm's frame; those faded whose shapes collide."""
+    parts = [Part("hand", *shape) for shape in shapes.hand(grasp.q, names_of(clash, "hand"))]
+    faded = bool(names_of(clash, "object"))
+    for mesh, T, colour in shapes.object():
+        parts.append(Part("object", mesh, grasp.T_palm_object @ T, (*colour[:3], FADED) if faded else colour))
+    return parts + obstacle_parts(shapes, grasp.T_palm_object, names_of(clash, "obstacle"))
 
 
-def obstacle_parts(shapes: BodyShapes, T_palm_object: Array) -> list[Part]:
-    """The obstacles, in the palm's frame, where the object is at a placement (4, 4)."""
+def obstacle_parts(shapes: BodyShapes, T_palm_object: Array, without: Collection[str] = ()) -> list[Part]:
+    """The obstacles but those of some names, in the palm's frame, where the object is at a placement (4, 4)."""
     placements = {"object": T_palm_object, "palm": np.eye(4)}
+    names = [obstacle.name for obstacle in shapes.problem.obstacles if obstacle.name not in without]
     return [
         Part("obstacle", mesh, T_palm_frame @ T, colour)
         for frame, T_palm_frame in placements.items()
-        for mesh, T, colour in shapes.obstacles(frame)
+        for mesh, T, colour in shapes.obstacles(frame, names)
     ]
 
 
-def grasp_parts(shapes: BodyShapes, grasp: Grasp, size: float = 1.0) -> tuple[list[Part], Array]:
+def _clash_parts(shapes: BodyShapes, grasp: Grasp, size: float, clash: Clash) -> list[Part]:
+    """Shapes that collide, in stripes, and the point where they do most."""
+    hand, placements = grasp.problem.hand, grasp.problem.hand.link_placements(grasp.q)
+    carried = {"object": grasp.T_palm_object, "obstacle": grasp.T_palm_object}
+    for shape, group in zip(clash.shapes, clash.groups, strict=True):
+        if group == "hand":
+            carried[f"hand {shape.joint}"] = placements[shape.link] @ np.linalg.inv(hand.frame(shape.link)[1])
+    parts = []
+    for group, joint, (mesh, T, colour) in in_stripes(clash, shapes, size * WIDTH):
+        T_palm_joint = np.eye(4) if joint == 0 else carried[f"hand {joint}" if group == "hand" else group]
+        parts.append(Part(group, mesh, T_palm_joint @ T, colour))
+    if np.isfinite(clash.point).all():
+        T_palm_point = np.eye(4)
+        T_palm_point[:3, 3] = clash.point
+        ball = ellipsoid(np.full(3, size * CONTACT_RADIUS), 24)
+        parts.append(Part("clash", ball, T_palm_point, COLOURS["clash"]))
+    return parts
+
+
+def grasp_parts(
+    shapes: BodyShapes, grasp: Grasp, size: float = 1.0, clash: Clash | None = None
+) -> tuple[list[Part], Array]:
     """Everything that one grasp is drawn with, in the palm's frame.
+
+    Shapes that collide are drawn in stripes with the point where they are deepest in each other, in place of contacts,
+    normals and ellipsoid.
 
     Args:
         shapes: Meshes of hand and object.
         grasp: The grasp.
         size: Scale of what is drawn on top of hand and object.
+        clash: The shapes that collide, if any.
 
     Returns:
         The parts, and the semi-axes of the velocity ellipsoid, longest first (3,), metres a radian.
     """
-    parts = body_parts(shapes, grasp)
+    parts = body_parts(shapes, grasp, clash)
+    if clash is not None:
+        return parts + _clash_parts(shapes, grasp, size, clash), velocity_ellipsoid(grasp)[1]
     ball = ellipsoid(np.full(3, size * CONTACT_RADIUS), 24)
     for point, normal in zip(grasp.contact_points, grasp.contact_normals, strict=True):
         T = np.eye(4)
@@ -237,9 +307,11 @@ def grasp_parts(shapes: BodyShapes, grasp: Grasp, size: float = 1.0) -> tuple[li
     return parts, semi_axes
 
 
-def upright_parts(shapes: BodyShapes, grasp: Grasp, size: float = 1.0) -> tuple[list[Part], Array]:
+def upright_parts(
+    shapes: BodyShapes, grasp: Grasp, size: float = 1.0, clash: Clash | None = None
+) -> tuple[list[Part], Array]:
     """The parts and semi-axes of :func:`grasp_parts`, with the plane level on which the object stands."""
-    parts, semi_axes = grasp_parts(shapes, grasp, size)
+    parts, semi_axes = grasp_parts(shapes, grasp, size, clash)
     T = _upright(grasp)
     return [Part(p.group, p.mesh, T @ p.T, p.colour) for p in parts], semi_axes
 
@@ -276,13 +348,20 @@ def size_of(parts: list[Part]) -> float:
     return 1.0 if 0.6 < size < 1.6 else size
 
 
-def subject_of(parts: list[Part], grasp: Grasp, size: float) -> Subject:
-    """What the camera should see; the contacts stand for an object that has no shape."""
-    marks = [p for p in parts if p.group == "contact"]
+def subject_of(parts: list[Part], size: float, clash: Clash | None = None) -> Subject:
+    """What the camera should see; the contacts stand for an object that has no shape.
+
+    Where shapes collide, what it should see are those of hand and object, and where they do most.
+    """
+    marks = [p for p in parts if p.group in ("contact", "clash")]
     groups = [[p for p in parts if p.group == group] or marks for group in ("hand", "object")]
+    if clash is not None:
+        bodies = [p for p in parts if p.group in ("hand", "object")]
+        groups = [[p for p in bodies if (p.colour in STRIPES) is which] or bodies for which in (False, True)]
     T = np.diag([1.0 / size, 1.0 / size, 1.0 / size, 1.0])
     hand, body = (merged([p.mesh.moved(T @ p.T) for p in group]) for group in groups)
-    return Subject.of(hand, body, np.array([T[:3, :3] @ mark.T[:3, 3] for mark in marks]).reshape(-1, 3))
+    marked = [T[:3, :3] @ mark.T[:3, 3] for mark in marks] or [body.vertices.mean(axis=0)]
+    return Subject.of(hand, body, np.array(marked))
 
 
 def _side(parts: list[Part], right: Array, sign: float, size: float) -> tuple[Part, ...]:

@@ -8,7 +8,6 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-from graspatlas.result.result import Result
 from graspatlas.support.terminal import say
 from graspatlas.viewer.films.animation import Film
 from graspatlas.viewer.scene.scene import Scene
@@ -21,12 +20,12 @@ if TYPE_CHECKING:
 __all__ = ["close", "show"]
 
 
-def show(shown: Result | Film, *, open_browser: bool, wait: bool, host: str) -> meshcat.Visualizer:
-    """Serve a result's scene, or a film; see :func:`graspatlas.viewer.view`."""
+def show(shown: Scene | Film, *, open_browser: bool, wait: bool, host: str) -> meshcat.Visualizer:
+    """Serve a scene of a result, or a film; see :func:`graspatlas.viewer.view`."""
     if isinstance(shown, Film):
         name, told = shown.name, [*film_commands(shown), film_caption(shown), film_animation(shown)]
     else:
-        name, told = shown.problem.name, list(commands(Scene(shown), with_legend=True))
+        name, told = shown.result.problem.name, list(commands(shown, with_legend=True))
     visualizer = _start(host)
     try:
         for command in told:

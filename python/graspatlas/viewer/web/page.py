@@ -16,9 +16,9 @@ from PIL import Image
 
 from graspatlas.errors import GraspAtlasError
 from graspatlas.viewer.render.shading import FloorShadow
-from graspatlas.viewer.render.text_images import caption_image, legend_image
+from graspatlas.viewer.render.text_images import LINE, SMALL, caption_image, legend_image
 from graspatlas.viewer.scene.camera import Camera
-from graspatlas.viewer.scene.captions import caption, legend
+from graspatlas.viewer.scene.captions import Caption, caption, scene_legend
 from graspatlas.viewer.scene.scene import SHOW_THROUGH, Colour, Part, Scene
 from graspatlas.viewer.web.threejs import Content, ground, group, light, mesh, perspective_camera, sprite
 
@@ -57,6 +57,8 @@ THROUGH = 0.6
 LETTERS = 72.0
 #: Width of a caption compared with the distance between the grasps, and its height with that of the page.
 CAPTION_WIDTH, CAPTION_HEIGHT = 0.9, 0.115
+#: A caption of the usual height.
+USUAL = Caption("title", "index", "motion")
 
 
 def filled_page(name: str, commands: Iterable[Command], legend: str, player: str = "", script: str = "") -> str:
@@ -111,13 +113,16 @@ def commands(scene: Scene, *, with_legend: bool = False) -> Iterator[Command]:
         scene: The scene.
         with_legend: Whether the colours are explained below the captions.
     """
-    camera = scene.camera(ASPECT, WINDOW)
+    words = [caption(scene.result, exhibit) for exhibit in scene.exhibits]
+    more = (max(w.rows for w in words) - 1) * LINE * SMALL * LETTERS / caption_image(USUAL, LETTERS).height
+    left, right, bottom, top = WINDOW
+    camera = scene.camera(ASPECT, (left, right, bottom + 2.0 * CAPTION_HEIGHT * more, top))
     yield from studio(camera)
     centred = np.eye(4)
     centred[:3, 3] = -camera.target
     yield {"type": "set_transform", "path": ROOT, "matrix": centred.T.ravel().tolist()}
     for exhibit in scene.exhibits:
-        for name in ("hand", "object", "obstacle", "contact", "normal", "ellipsoid"):
+        for name in ("hand", "object", "obstacle", "contact", "normal", "ellipsoid", "clash"):
             parts = [part for part in exhibit.parts if part.group == name]
             members = [mesh(part.mesh, part.T, part.colour) for part in parts]
             if name in SHOW_THROUGH:
@@ -126,7 +131,7 @@ def commands(scene: Scene, *, with_legend: bool = False) -> Iterator[Command]:
             if members:
                 yield set_object(f"{ROOT}/{exhibit.name}/{name}", group(members))
     yield set_object(f"{ROOT}/floor", floor_shadow(part for exhibit in scene.exhibits for part in exhibit.parts))
-    yield from _captions(scene, camera, with_legend)
+    yield from _captions(scene, camera, [caption_image(w, LETTERS) for w in words], with_legend)
 
 
 def set_object(path: str, content: Content) -> Command:
@@ -164,25 +169,28 @@ def floor_shadow(parts: Iterable[Part]) -> Content:
     return ground(png_bytes(Image.fromarray(pixels)), *floor.corners)
 
 
-def _captions(scene: Scene, camera: Camera, with_legend: bool) -> Iterator[Command]:
+def _captions(scene: Scene, camera: Camera, images: list[Image.Image], with_legend: bool) -> Iterator[Command]:
     """Captions below the grasps, and the legend below those; they turn with the camera and stay readable."""
     half = camera.distance * np.tan(camera.field_of_view / 2.0) * np.array([ASPECT, 1.0])
     seen = [camera.project(exhibit.points, ASPECT)[:, :2] * half for exhibit in scene.exhibits]
     middles = [float(points[:, 0].min() + points[:, 0].max()) / 2.0 for points in seen]
     bottom = min(float(points[:, 1].min()) for points in seen)
-    images = [caption_image(caption(scene.result, exhibit), LETTERS) for exhibit in scene.exhibits]
     widest = CAPTION_WIDTH * (middles[1] - middles[0] if len(middles) > 1 else 2.0 * half[0])
     visible = 2.0 * camera.distance * np.tan(camera.field_of_view / 2.0)
-    pixel = min(widest / max(image.width for image in images), CAPTION_HEIGHT * visible / images[0].height)
-    height = pixel * images[0].height
+    usual = caption_image(USUAL, LETTERS).height
+    pixel = min(widest / max(image.width for image in images), CAPTION_HEIGHT * visible / usual)
+    under = bottom - 0.15 * pixel * usual
     for exhibit, middle, image in zip(scene.exhibits, middles, images, strict=True):
-        place = camera.target + np.array([middle, bottom - 0.65 * height]) @ camera.axes[:2]
+        height = pixel * image.height
+        place = camera.target + np.array([middle, under - 0.5 * height]) @ camera.axes[:2]
         yield set_object(f"{ROOT}/{exhibit.name}/caption", sprite(png_bytes(image), place, pixel * image.width, height))
     if with_legend:
-        image = legend_image(legend(), 0.5 * LETTERS)
+        image = legend_image(scene_legend(scene), 0.5 * LETTERS)
+        tallest = pixel * max(shown.height for shown in images)
         middle = sum(middles) / len(middles)
-        place = camera.target + np.array([middle, bottom - 1.4 * height]) @ camera.axes[:2]
-        yield set_object(f"{ROOT}/legend", sprite(png_bytes(image), place, pixel * image.width, pixel * image.height))
+        place = camera.target + np.array([middle, under - tallest - 0.25 * pixel * usual]) @ camera.axes[:2]
+        size = min(pixel, 0.96 * 2.0 * half[0] / image.width)
+        yield set_object(f"{ROOT}/legend", sprite(png_bytes(image), place, size * image.width, size * image.height))
 
 
 def png_bytes(image: Image.Image) -> bytes:

@@ -2,7 +2,9 @@
 
 const FORCE_COLOUR = [0.0, 0.52, 0.42];
 // How much of what is drawn on top shows through what hides it.
-const SHOWN_THROUGH = { contact: 0.5, normal: 0.45, force: 0.45, ellipsoid: 0.13 };
+const SHOWN_THROUGH = { contact: 0.5, normal: 0.45, force: 0.45, ellipsoid: 0.13, clash: 0.5 };
+// Opacity of what gives way to shapes that collide, and the layers that do.
+const FADED = 0.16, HIDDEN_BY_A_CLASH = ["contact", "normal", "ellipsoid"];
 // Lamps about the camera (right, up, backwards) and their intensity.
 const LAMPS = [[[-0.55, 0.9, 0.75], 0.62], [[0.9, 0.15, 0.6], 0.22], [[0.35, 0.75, -0.75], 0.2]];
 
@@ -10,7 +12,10 @@ const LAMPS = [[[-0.55, 0.9, 0.75], 0.62], [[0.9, 0.15, 0.6], 0.22], [[0.35, 0.7
 class Workshop {
   constructor(numbers) {
     const { shapes, view, colours } = facts;
-    const shared = ({ mesh, joint, colour }) => ({ joint, geometry: this.geometry(numbers, mesh), material: this.material(colour) });
+    const shared = ({ mesh, joint, colour, fades, on }) => ({
+      joint, on, geometry: this.geometry(numbers, mesh), material: this.material(colour),
+      faded: fades ? this.material([...colour.slice(0, 3), FADED]) : null,
+    });
     this.hand = shapes.hand.map(shared);
     this.object = shapes.object.map(shared);
     this.obstacles = { object: shapes.obstacles.object.map(shared), palm: shapes.obstacles.palm.map(shared) };
@@ -20,6 +25,8 @@ class Workshop {
     const layer = (colour, name) => [this.material(colour), this.through(colour, SHOWN_THROUGH[name])];
     this.layers = { force: layer([...FORCE_COLOUR, 1], "force") };
     for (const name of ["contact", "normal", "ellipsoid"]) this.layers[name] = layer(colours[name], name);
+    this.stripes = facts.rejected.stripes.map(shared);
+    this.layers.clash = layer(colours.clash, "clash");
     if (shapes.sticks) [this.bone, this.joint] = shapes.sticks.colours.map((colour) => this.material(colour));
   }
 
@@ -60,13 +67,16 @@ class Figure {
     this.palm = this.group(this.scene);
     this.joints = this.placements.map(() => this.group());
     this.object = this.group();
-    for (const { joint, geometry, material } of workshop.hand) this.joints[joint].add(new THREE.Mesh(geometry, material));
-    for (const { geometry, material } of workshop.object) this.object.add(new THREE.Mesh(geometry, material));
+    this.fading = [];
+    for (const shape of workshop.hand) this.solid(shape, this.joints[shape.joint]);
+    for (const shape of workshop.object) this.solid(shape, this.object);
     this.obstacles = { object: this.group(), palm: this.group() };
     for (const [frame, group] of Object.entries(this.obstacles)) {
-      for (const { geometry, material } of workshop.obstacles[frame]) group.add(new THREE.Mesh(geometry, material));
+      for (const shape of workshop.obstacles[frame]) this.solid(shape, group);
     }
     this.layers = {};
+    this.stripes = workshop.stripes.map((shape) => this.solid(shape, this.carrier(shape)));
+    this.clash = this.mark("clash", workshop.ball);
     this.contacts = facts.contacts.map(() => this.mark("contact", workshop.ball));
     this.normals = facts.contacts.map(() => this.mark("normal", workshop.arrow));
     this.forces = facts.contacts.map(() => this.mark("force", workshop.arrow));
@@ -75,6 +85,33 @@ class Figure {
     this.scene.add(new THREE.AmbientLight(0xffffff, 0.42));
     this.lamps = LAMPS.map(([, intensity]) => new THREE.DirectionalLight(0xffffff, intensity));
     this.scene.add(...this.lamps);
+  }
+
+  solid(shape, parent) {
+    const made = new THREE.Mesh(shape.geometry, shape.material);
+    parent.add(made);
+    if (shape.faded) this.fading.push([made, shape]);
+    return made;
+  }
+
+  // What carries one of the shapes that collide.
+  carrier({ on, joint }) {
+    if (on === "hand") return this.joints[joint];
+    if (on === "object") return this.object;
+    return this.obstacles[joint ? "object" : "palm"];
+  }
+
+  // Shapes that collide stand for the bodies that they belong to.
+  showClash(on) {
+    const { stripes, point } = facts.rejected;
+    this.clashes = on && stripes.length > 0;
+    for (const mesh of this.stripes) mesh.visible = this.clashes;
+    for (const [mesh, { material, faded }] of this.fading) mesh.material = this.clashes ? faded : material;
+    this.clash.visible = Boolean(this.clashes && point);
+    if (this.clash.visible) {
+      const radius = facts.view.contact_radius;
+      this.clash.matrix.makeScale(radius, radius, radius).setPosition(...point);
+    }
   }
 
   group(parent = this.palm) {
@@ -183,7 +220,7 @@ class HandView {
     this.orbit = new Orbit(this.canvas, { changed: () => this.stage.request() });
     this.orbit.look(new THREE.Vector3(...facts.view.direction));
     this.panes = [];
-    this.visible = { contact: true, normal: true, force: false, ellipsoid: true, object: true, obstacles: true };
+    this.visible = { contact: true, normal: true, force: false, ellipsoid: true, object: true, obstacles: true, clash: true };
     selection.on("grasps", () => this.update());
     selection.on("view", () => this.update());
   }
@@ -225,7 +262,10 @@ class HandView {
     this.fit(boxes[0]);
     boxes.forEach(([x, y, w, h], i) => {
       const figure = this.figures[i];
-      for (const [name, layer] of Object.entries(figure.layers)) layer.visible = this.visible[name];
+      figure.showClash(this.visible.clash && this.panes[i] === facts.rejected.chart);
+      for (const [name, layer] of Object.entries(figure.layers)) {
+        layer.visible = this.visible[name] && !(figure.clashes && HIDDEN_BY_A_CLASH.includes(name));
+      }
       figure.object.visible = this.visible.object;
       for (const group of Object.values(figure.obstacles)) group.visible = this.visible.obstacles;
       this.orbit.update(w / h);
@@ -268,7 +308,9 @@ class HandView {
       const value = `${index.label} ${short(selection.values[grasp])}`;
       return element("div", { className: "caption" },
         ...badge, element("b", { textContent: title }), rest ? ` ${rest}` : "", button, element("br"),
-        element("span", { className: "value", textContent: value }), element("br"), motionText(this.figures[i].read));
+        element("span", { className: "value", textContent: value }), element("br"), motionText(this.figures[i].read),
+        ...(grasp === facts.rejected.chart ? facts.rejected.lines : []).flatMap((line) =>
+          [element("br"), element("span", { className: "no", textContent: `\u2717 ${line}` })]));
     });
     captions.forEach((caption, i) => {
       Object.assign(caption.style, { left: `${(100 * i) / n}%`, width: `${100 / n}%` });

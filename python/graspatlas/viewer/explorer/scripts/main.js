@@ -1,6 +1,7 @@
 // Puts the parts together: controls, the address, and the path from pin to pin.
 
 const CHARTS_A_SECOND = 14;
+const STRIPED = "repeating-linear-gradient(45deg, #d60d17 0 2px, #fcf2ed 2px 4px)";
 
 class Controls {
   constructor(selection, atlas, hand) {
@@ -61,6 +62,7 @@ class Controls {
     ];
     const { object, palm } = facts.shapes.obstacles;
     if (object.length || palm.length) shown.push(["obstacles", "obstacles", "", true]);
+    if (facts.rejected.stripes.length) shown.push(["clash", "shapes that collide, red and white", STRIPED, true]);
     byId("layers").append(...shown.map(([name, text, colour, on]) => {
       const box = checkbox(text, on, (checked) => {
         this.hand.layers({ [name]: checked });

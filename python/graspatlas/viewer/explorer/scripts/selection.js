@@ -159,6 +159,7 @@ class Selection {
     if (grasp === facts.best && !facts.maxima.length) names.push("Best grasp");
     else if (grasp === facts.best) names.push("Best chart");
     if (grasp === facts.worst) names.push("Worst grasp");
+    if (grasp === facts.nearest) names.push("Nearest to an accepted grasp");
     if (grasp === 0) names.push("x\u2081, the first grasp");
     return [names.join(", ") || `Chart ${grasp}`, names.length ? `chart ${grasp}` : ""];
   }
