@@ -21,6 +21,7 @@ __all__ = [
     "fixed_parents",
     "joint_limits",
     "joints_of_kind",
+    "joints_on_way",
     "lock_joints",
     "mesh_urdf",
     "mimics",
@@ -174,6 +175,22 @@ def fixed_parents(urdf: str) -> dict[str, str]:
         for child, parent in ends
         if child is not None and parent is not None
     }
+
+
+def joints_on_way(urdf: str, link: str) -> tuple[str, ...]:
+    """Names of the moving joints between the root link and another, from the root on.
+
+    Args:
+        urdf: Text of a URDF.
+        link: Name of the link.
+    """
+    carriers = {_link_of(joint, "child"): joint for joint in ElementTree.fromstring(urdf).findall("joint")}
+    way = []
+    while (joint := carriers.pop(link, None)) is not None:
+        if joint.get("type") != "fixed":
+            way.append(str(joint.get("name")))
+        link = _link_of(joint, "parent")
+    return tuple(reversed(way))
 
 
 def mimics(urdf: str) -> tuple[Mimic, ...]:
