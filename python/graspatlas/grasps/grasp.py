@@ -184,7 +184,7 @@ class Grasp:
         :class:`graspatlas.Reachable`.
 
         Args:
-            clearance: Distance that the arm's links must keep from each other, the hand, the object and obstacles [m].
+            clearance: Distance that the arm's links must keep from the hand, the object and obstacles [m].
 
         Raises:
             GraspAtlasError: If none were found, the problem has no arm, or something has no collision shape.

@@ -203,7 +203,7 @@ class Grasps(Light):
         """Where the problem's arm can bring the hand: its postures at the grasps; see :class:`graspatlas.Reachable`.
 
         Args:
-            clearance: Distance that the arm's links must keep from each other, the hand, the object and obstacles [m].
+            clearance: Distance that the arm's links must keep from the hand, the object and obstacles [m].
 
         Raises:
             GraspAtlasError: If the problem has no arm, or something has no collision shape.

@@ -10,6 +10,7 @@ from pathlib import Path
 from graspatlas.cluster.workers import check_workers
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.named_hands import named_hand
+from graspatlas.problem.requirement import StatedRequirement
 from graspatlas.proposals.assignments.matching import Assignment
 from graspatlas.proposals.files import folder_name, problem_file, write_text
 from graspatlas.proposals.kept_looks import KeptLooks
@@ -104,6 +105,7 @@ def propose(
     whole(top, "top")
     find_index(quality)
     check_requirements(require)
+    _check_no_arm(require)
     whole(seed, "seed", 0)
     looker: Looker = here
     if workers is not None or scheduler is not None:
@@ -134,6 +136,16 @@ def propose(
     write_regions(setting.regions, folder / REGIONS)
     write_page(found, f"{setting.body.name} by {setting.hand}", folder / PAGE)
     return found
+
+
+def _check_no_arm(require: Sequence[RequirementLike]) -> None:
+    """Raise GraspAtlasError where a requirement asks for an arm."""
+    for each in require:
+        if isinstance(each, StatedRequirement) and each.needs_arm:
+            raise GraspAtlasError(
+                f"requirement {each.name} asks what an arm can bring about, and proposals know of none: leave it out, "
+                "and state the arm in the problem file of a proposal"
+            )
 
 
 def _schedule(start: float, deadline: float, top: int) -> tuple[float, float]:

@@ -102,6 +102,13 @@ class ArmScene:
     pairs: Int32Array
     names: tuple[tuple[str, str], ...]
 
+    def required(self, clearance: float) -> Array:
+        """Distances that the pairs must keep [p], metres: a clearance, or 0 between links of the arm.
+
+        These are near each other in whatever posture, by construction.
+        """
+        return np.array([0.0 if second.startswith(ARM) else clearance for _, second in self.names])
+
     @classmethod
     def of(cls, problem: Problem, both: CarriedHand) -> ArmScene:
         """The scene of a problem and its arm.

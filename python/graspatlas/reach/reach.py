@@ -90,11 +90,12 @@ class ArmReach:
 
     Args:
         problem: The problem, with an arm; all things need collision shapes.
-        clearance: Distance that pairs of shapes must keep [m].
+        clearance: Distance that the arm's links must keep from the hand, the object and obstacles [m].
 
     Attributes:
         scene: The shapes, and the pairs that are looked at.
         both: Arm and hand as one mechanism.
+        collisions: The compiled checker of the pairs, for configurations of both.
 
     Raises:
         GraspAtlasError: If the problem has no arm, or a thing no collision shape.
@@ -106,9 +107,9 @@ class ArmReach:
         self._arm = arm = problem.arm
         self.both = both = CarriedHand.of(arm, problem.hand)
         self.scene = ArmScene.of(problem, both)
-        required = np.full(len(self.scene.pairs), float(clearance))
         shapes = [shape.as_tuple() for shape in self.scene.shapes]
-        collisions = _core.CollisionBatch(both.model, shapes, self.scene.pairs, required)
+        required = self.scene.required(clearance)
+        self.collisions = _core.CollisionBatch(both.model, shapes, self.scene.pairs, required)
         (joint, T_joint_flange), (lower, upper) = arm.robot.frame(arm.flange), arm.robot.joint_limits
         self._batch = _core.ReachBatch(
             arm.robot.model,
@@ -116,7 +117,7 @@ class ArmReach:
             T_joint_flange,
             list(lower),
             list(upper),
-            collisions,
+            self.collisions,
             both.arm_at,
             both.hand_at,
             SEEDS,

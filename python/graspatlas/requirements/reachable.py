@@ -24,7 +24,8 @@ class Reachable(Requirement):
     is no proof that there is none. The way of the arm to the posture is not looked at.
 
     Attributes:
-        clearance: Distance that the arm's links must keep from each other, the hand, the object and obstacles [m].
+        clearance: Distance that the arm's links must keep from the hand, the object and obstacles [m]; each other they
+            must only not touch.
     """
 
     clearance: float = 0.0

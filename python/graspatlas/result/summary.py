@@ -7,6 +7,7 @@ from typing import Any, TypedDict
 from typing_extensions import NotRequired
 
 __all__ = [
+    "ArmSummary",
     "AuditSummary",
     "GapSummary",
     "GraspSummary",
@@ -63,6 +64,14 @@ class GraspSummary(TypedDict):
     object_xyz: list[float]
     object_quat_xyzw: list[float]
     chart: int
+
+
+class ArmSummary(TypedDict):
+    """For how many charts a posture of the arm was found, of those that meet the other requirements."""
+
+    name: str
+    reachable: int
+    of: int
 
 
 class OtherSummary(TypedDict):
@@ -127,4 +136,5 @@ class ResultSummary(TypedDict):
     best: GraspSummary | None
     gap: GapSummary | None
     others: NotRequired[dict[str, OtherSummary]]
+    arm: NotRequired[ArmSummary]
     refined: NotRequired[RefinementSummary]
