@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from problem_texts import CAN, fault, read
 
 import graspatlas as ga
+from graspatlas.sweep.runs import Run, runs_of
 
 ARM = """
 arm:
@@ -108,3 +110,15 @@ def test_the_requirement_needs_an_arm() -> None:
 def test_a_wrong_clearance(clearance: object) -> None:
     said = fault(f"{CAN}{ARM.replace('[reachable]', f'[reachable: {{clearance: {clearance}}}]')}")
     assert "clearance" in said
+
+
+def test_runs_with_another_arm_are_other_runs(tmp_path: Path) -> None:
+    """Sweeps and searches know what they keep by a digest of the whole problem."""
+    keys = []
+    for number, text in enumerate((CAN, CAN + ARM, CAN + ARM.replace("[0.5, 0.2, 0.3]", "[0.5, 0.2, 0.31]"))):
+        file = tmp_path / str(number) / "can.yaml"
+        file.parent.mkdir()
+        file.write_text(text.replace("requirements: [reachable]", ""))
+        (run,) = runs_of(str(file), Run("", None), [(2, 0.5, 0.5, "manipulability_volume")])
+        keys.append(replace(run, file="").key)
+    assert len(set(keys)) == 3

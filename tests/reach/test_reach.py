@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+import signal
+import time
 from dataclasses import replace
 from itertools import combinations
 from typing import Any
@@ -184,12 +186,12 @@ def test_collisions_are_those_of_coal(can_on_ur5: ga.Problem) -> None:
     rng = np.random.default_rng(0)
     arm, lower, upper = can_on_ur5.arm, *can_on_ur5.hand.joint_limits
     assert arm is not None
-    Q, H = random_postures(arm, 100), rng.uniform(lower, upper, (100, len(lower)))
+    Q, H = random_postures(arm, 60), rng.uniform(lower, upper, (60, len(lower)))
     whole = np.empty((len(Q), reach.both.model.q_size))
     whole[:, reach.both.arm_at], whole[:, reach.both.hand_at] = Q, H
     distances = np.array([scene.distance(*pair) for pair in zip(Q, H, strict=True)])
     free, clear = np.asarray(reach.collisions.free(whole)), (distances <= 0.0) | (distances > 1e-5)
-    assert 15 < free.sum() < 85
+    assert 10 < free.sum() < 50
     assert clear.mean() > 0.95
     np.testing.assert_array_equal(free[clear], distances[clear] > 0.0)
     # Where these postures that hit nothing are, one is found, and it hits nothing.
@@ -200,7 +202,7 @@ def test_collisions_are_those_of_coal(can_on_ur5: ga.Problem) -> None:
 
 
 def test_a_clearance_is_kept(can_on_ur5: ga.Problem, can_result: ga.Result) -> None:
-    scene, grasps = Scene(can_on_ur5), ga.Grasps(can_on_ur5, can_result.atlas.centers[::60])
+    scene, grasps = Scene(can_on_ur5), ga.Grasps(can_on_ur5, can_result.atlas.centers[::120])
     free = grasps.reach()
     distances = distances_of(scene, free, grasps)
     clearance = float(np.nanmedian(distances))
@@ -253,3 +255,18 @@ def test_who_is_in_the_way_is_said(can_on_ur5: ga.Problem) -> None:
 def test_a_problem_without_an_arm(can: ga.Problem) -> None:
     with pytest.raises(ga.GraspAtlasError, match=r"problem 'schunk_can' has no arm; state one: see graspatlas.Arm"):
         ga.Grasps(can, can.x1_array).reach()
+
+
+def test_ctrl_c_ends_it(can_on_ur5: ga.Problem, can_result: ga.Result) -> None:
+    grasps = ga.Grasps(can_on_ur5, np.repeat(can_result.atlas.centers, 40, axis=0))
+    grasps.T_palm_object  # noqa: B018  (computed before)
+    ga.Grasps(can_on_ur5, can_on_ur5.x1_array).reach()  # shapes are read before
+    before, start = signal.signal(signal.SIGALRM, signal.default_int_handler), time.perf_counter()
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.2)
+        with pytest.raises(KeyboardInterrupt):
+            grasps.reach()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    assert time.perf_counter() - start < 3.0

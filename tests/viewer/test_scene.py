@@ -184,3 +184,24 @@ def test_obstacles_are_drawn_where_they_are_and_see_through(small_result: ga.Res
     assert_allclose((ball.min(axis=0) + ball.max(axis=0)) / 2.0, [0.0, 0.0, 0.2], atol=1e-3)
     bare, shown = Scene(small_result), Scene(result)
     assert_allclose(shown.camera(1.5, (-0.9, 0.9, -0.5, 0.8)).target, bare.camera(1.5, (-0.9, 0.9, -0.5, 0.8)).target)
+
+
+def test_the_arm_is_drawn_behind_the_best_grasp_and_see_through(small_result: ga.Result) -> None:
+    arm = ga.Arm.named("ur5_robot", "tool0", palm=ga.Pose([0, 0, 0.02]), object=ga.Pose([0.4, 0.2, 0.4]))
+    result = replace(small_result, problem=replace(small_result.problem, arm=arm))
+    positions, grasp = result.best.arm_positions(), result.best
+    parts = [part for part in Scene(result, worst=False).exhibits[0].parts if part.group == "arm"]
+    assert len(parts) == 8
+    assert all(0.0 < part.colour[3] < 0.6 for part in parts)
+    # The last link's mesh is where the arm's kinematics have it, seen from the palm.
+    T_base_link = arm.robot.link_placements(arm.robot.configuration(positions))["wrist_3_link"]
+    T_palm_base = grasp.T_palm_object @ np.linalg.inv(arm.T_base_object)
+    drawn = list(bodies.BodyShapes(result.problem).arm(grasp))
+    assert_allclose(drawn[-2][1], T_palm_base @ T_base_link, atol=1e-12)
+    assert_allclose(drawn[-2][1][:3, 3], np.linalg.inv(arm.T_flange_palm)[:3, 3] - [0.0, 0.0, 0.0823], atol=1e-9)
+    bare, shown = Scene(small_result, worst=False), Scene(result, worst=False)
+    assert_allclose(shown.camera(1.5, (-0.9, 0.9, -0.5, 0.8)).target, bare.camera(1.5, (-0.9, 0.9, -0.5, 0.8)).target)
+    pair = Scene(result)
+    assert not [part for exhibit in pair.exhibits for part in exhibit.parts if part.group == "arm"]
+    away = replace(result.problem, arm=replace(arm, object=ga.Pose([3.0, 0.0, 0.0])))
+    assert not list(bodies.BodyShapes(away).arm(replace(grasp, problem=away)))

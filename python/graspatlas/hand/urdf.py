@@ -31,6 +31,7 @@ __all__ = [
     "sphere_urdf",
     "velocity_limits",
     "with_followers_limited",
+    "without_visuals",
 ]
 
 #: Joints that move with one degree of freedom.
@@ -219,6 +220,19 @@ def with_followers_limited(urdf: str) -> str:
             joint.remove(limit)
         ElementTree.SubElement(joint, "limit", {"lower": "0", "upper": "0", "effort": "0", "velocity": "0"})
     return ElementTree.tostring(root, encoding="unicode") if changed else urdf
+
+
+def without_visuals(urdf: str) -> str:
+    """The URDF without what is to be seen alone.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    root = ElementTree.fromstring(urdf)
+    for link in root.findall("link"):
+        for visual in link.findall("visual"):
+            link.remove(visual)
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def lock_joints(urdf: str, positions: Mapping[str, float]) -> str:

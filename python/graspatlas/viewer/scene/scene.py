@@ -26,6 +26,7 @@ __all__ = [
     "Exhibit",
     "Part",
     "Scene",
+    "arm_parts",
     "body_parts",
     "direction_to",
     "fitted_camera",
@@ -82,7 +83,7 @@ class Part:
     """One mesh of one colour.
 
     Attributes:
-        group: ``hand``, ``object``, ``obstacle``, or what is drawn on top, a name in ``COLOURS``.
+        group: ``hand``, ``object``, ``obstacle``, ``arm``, or what is drawn on top, a name in ``COLOURS``.
         mesh: The mesh; the same one may stand in several parts.
         T: Its placement (4, 4).
         colour: Red, green, blue and opacity, each 0 to 1.
@@ -117,7 +118,7 @@ class Exhibit:
 
 
 class Scene:
-    """The best grasp on the left, the worst on the right, seen from one direction.
+    """The best grasp on the left, the worst on the right, seen from one direction; alone, the best has its arm.
 
     Args:
         result: The result.
@@ -138,6 +139,8 @@ class Scene:
         sides = [(name, grasp, *grasp_parts(shapes, grasp, size)) for name, grasp in grasps]
         subjects = [subject_of(parts, grasp, size) for _, grasp, parts, _ in sides]
         self.direction = direction_to(subjects, result.problem.object_joint_model)
+        if len(sides) == 1:  # two arms would stand in each other's picture
+            sides[0][2].extend(arm_parts(shapes, best))
         right = Camera(np.zeros(3), self.direction, 1.0).axes[0]
         #: Best, then worst.
         self.exhibits = tuple(
@@ -201,6 +204,11 @@ def obstacle_parts(shapes: BodyShapes, T_palm_object: Array) -> list[Part]:
         for frame, T_palm_frame in placements.items()
         for mesh, T, colour in shapes.obstacles(frame)
     ]
+
+
+def arm_parts(shapes: BodyShapes, grasp: Grasp) -> list[Part]:
+    """The arm that brings the hand to a grasp, in the palm's frame; nothing where there is none, or none is found."""
+    return [Part("arm", mesh, T, colour) for mesh, T, colour in shapes.arm(grasp)]
 
 
 def grasp_parts(shapes: BodyShapes, grasp: Grasp, size: float = 1.0) -> tuple[list[Part], Array]:
