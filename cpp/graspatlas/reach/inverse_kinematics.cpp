@@ -65,7 +65,7 @@ InverseKinematics::InverseKinematics(const ArmParts& arm) : model_(arm.model), j
       longest_ += (origin - last).norm();
     if (found->prismatic) longest_ += std::max(std::abs(arm.lower[q]), std::abs(arm.upper[q]));
     last = origin;
-    axes_.push_back({v, found->q_index, turns_round, arm.lower[q], arm.upper[q]});
+    axes_.push_back({v, found->q_index, turns_round, found->prismatic, arm.lower[q], arm.upper[q]});
   }
   longest_ += frame_.translation.norm();
   length_ = std::max(0.5 * longest_, 1e-3);
@@ -129,13 +129,27 @@ void InverseKinematics::step(const Vector6& e, double damping, double* q) {
   }
 }
 
+/// Takes whole turns off the joints, which changes nothing else.
+void InverseKinematics::unwind(double* q) const {
+  constexpr double kTurn = 2.0 * M_PI;
+  for (const Axis& axis : axes_) {
+    if (axis.turns_round || axis.slides) continue;
+    double& at = q[axis.q];
+    while (at > M_PI && at - kTurn >= axis.lower) at -= kTurn;
+    while (at < -M_PI && at + kTurn <= axis.upper) at += kTurn;
+  }
+}
+
 bool InverseKinematics::solve(const Placement& target, double* q) {
   double least = std::numeric_limits<double>::infinity();
   for (int steps = 0, idle = 0; steps < kMostSteps && idle < kPatience; ++steps) {
     model_.update(q, true);
     const Placement at = frame();
     const Vector6 e = error(at, target);
-    if (e.head<3>().norm() * length_ < kTolerance && e.tail<3>().norm() < kTolerance) return true;
+    if (e.head<3>().norm() * length_ < kTolerance && e.tail<3>().norm() < kTolerance) {
+      unwind(q);
+      return true;
+    }
     const double squared = e.squaredNorm();
     if (!std::isfinite(squared)) return false;
     idle = squared < kProgress * least ? 0 : idle + 1;

@@ -30,6 +30,7 @@ class InverseKinematics {
   struct Axis {
     int v, q;
     bool turns_round;  ///< its cosine and sine stand in q
+    bool slides;       ///< its q is a length [m]
     double lower, upper;
   };
 
@@ -42,7 +43,8 @@ class InverseKinematics {
   Placement place(const double* q);
   /// True when the frame cannot get to a placement, which is farther away than the arm is long.
   bool too_far(const Placement& target) const;
-  /// Moves q [q_size] until the frame is at the target, to kTolerance; false when it ends elsewhere.
+  /// Moves q [q_size] until the frame is at the target, to kTolerance; false when it ends elsewhere. Joints that could
+  /// be there by less than half a turn are, where their limits let them.
   bool solve(const Placement& target, double* q);
 
   static constexpr double kTolerance = 1e-9;  ///< [m] and [rad]
@@ -54,6 +56,7 @@ class InverseKinematics {
   Vector6 error(const Placement& at, const Placement& target) const;
   void fill_columns(const Placement& at, const double* q, const Vector6& e);
   void step(const Vector6& e, double damping, double* q);
+  void unwind(double* q) const;
 
   Model model_;
   int joint_;

@@ -120,11 +120,13 @@ class ArmScene:
         of_robot, of_hand = body_shapes(robot, robot.tree), body_shapes(problem.hand, problem.hand.tree)
         may = may_touch(of_robot, robot)
         arm = list(both.carried(of_robot, robot, ARM))
-        around = [*both.carried(of_hand, problem.hand, HAND), *_surroundings(problem, both)]
-        pairs = [pair for pair in combinations(range(len(arm)), 2) if pair not in may]
+        around = [*_surroundings(problem, both), *both.carried(of_hand, problem.hand, HAND)]
+        # What is in the way of most postures first, and the arm's own links, which take longest, last.
+        pairs = []
         for number, shape in enumerate(around, start=len(arm)):
             together = shape.joint if shape.name.startswith((HAND, OBSTACLE)) else -1
             pairs += [(first, number) for first, link in enumerate(arm) if link.joint != together]
+        pairs += [pair for pair in combinations(range(len(arm)), 2) if pair not in may]
         shapes = (*arm, *around)
         names = tuple((shapes[a].name, shapes[b].name) for a, b in pairs)
         return cls(shapes, np.array(pairs, np.int32).reshape(-1, 2), names)
