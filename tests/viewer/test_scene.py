@@ -20,6 +20,7 @@ from graspatlas.viewer.scene import bodies, meshes
 from graspatlas.viewer.scene import stick_figure as sketch
 from graspatlas.viewer.scene import velocity_ellipsoid as ellipsoid
 from graspatlas.viewer.scene.scene import CONTACT_RADIUS, Scene, grasp_parts
+from graspatlas.viewer.web.page import commands
 
 Array = NDArray[np.float64]
 
@@ -201,7 +202,10 @@ def test_the_arm_is_drawn_behind_the_best_grasp_and_see_through(small_result: ga
     assert_allclose(drawn[-2][1][:3, 3], np.linalg.inv(arm.T_flange_palm)[:3, 3] - [0.0, 0.0, 0.0823], atol=1e-9)
     bare, shown = Scene(small_result, worst=False), Scene(result, worst=False)
     assert_allclose(shown.camera(1.5, (-0.9, 0.9, -0.5, 0.8)).target, bare.camera(1.5, (-0.9, 0.9, -0.5, 0.8)).target)
-    pair = Scene(result)
-    assert not [part for exhibit in pair.exhibits for part in exhibit.parts if part.group == "arm"]
+    for scene, count in ((Scene(result), 0), (Scene(result, arm=True), 8)):
+        best, worst = ([part for part in exhibit.parts if part.group == "arm"] for exhibit in scene.exhibits)
+        assert (len(best), len(worst)) == (count, 0)
+    paths = [command.get("path") for command in commands(Scene(result, arm=True))]
+    assert "/graspatlas/best/arm" in paths
     away = replace(result.problem, arm=replace(arm, object=ga.Pose([3.0, 0.0, 0.0])))
     assert not list(bodies.BodyShapes(away).arm(replace(grasp, problem=away)))

@@ -118,17 +118,18 @@ class Exhibit:
 
 
 class Scene:
-    """The best grasp on the left, the worst on the right, seen from one direction; alone, the best has its arm.
+    """The best grasp on the left, the worst on the right, seen from one direction.
 
     Args:
         result: The result.
         worst: Whether the worst grasp is shown.
+        arm: Whether the arm stands behind the best grasp; by default where that is alone, since it would be in the way.
 
     Raises:
         GraspAtlasError: If a mesh of the hand or the object cannot be read.
     """
 
-    def __init__(self, result: GraspAtlas, *, worst: bool = True) -> None:
+    def __init__(self, result: GraspAtlas, *, worst: bool = True, arm: bool | None = None) -> None:
         self.result = result
         shapes = BodyShapes(result.problem)
         best = result.refined_best if result.refinement else result.best
@@ -139,7 +140,7 @@ class Scene:
         sides = [(name, grasp, *grasp_parts(shapes, grasp, size)) for name, grasp in grasps]
         subjects = [subject_of(parts, grasp, size) for _, grasp, parts, _ in sides]
         self.direction = direction_to(subjects, result.problem.object_joint_model)
-        if len(sides) == 1:  # two arms would stand in each other's picture
+        if len(sides) == 1 if arm is None else arm:
             sides[0][2].extend(arm_parts(shapes, best))
         right = Camera(np.zeros(3), self.direction, 1.0).axes[0]
         #: Best, then worst.

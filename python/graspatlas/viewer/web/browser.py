@@ -26,7 +26,7 @@ def show(shown: Result | Film, *, open_browser: bool, wait: bool, host: str) -> 
     if isinstance(shown, Film):
         name, told = shown.name, [*film_commands(shown), film_caption(shown), film_animation(shown)]
     else:
-        name, told = shown.problem.name, list(commands(Scene(shown), with_legend=True))
+        name, told = shown.problem.name, list(commands(Scene(shown, arm=True), with_legend=True))
     visualizer = _start(host)
     try:
         for command in told:
