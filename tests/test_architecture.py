@@ -32,6 +32,7 @@ FLOORS = (
         "collision",
         "pads",
         "execution",
+        "reach",
     ),
     *("atlas", "grasps", "search", "quality", "requirements"),
     *(

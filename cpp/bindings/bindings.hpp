@@ -42,6 +42,7 @@ void bind_grasp(pybind11::module_& module);
 void bind_quality(pybind11::module_& module);
 void bind_collision(pybind11::module_& module);
 void bind_climb(pybind11::module_& module);
+void bind_reach(pybind11::module_& module);
 void bind_render(pybind11::module_& module);
 
 }  // namespace graspatlas

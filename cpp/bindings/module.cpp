@@ -30,5 +30,6 @@ PYBIND11_MODULE(_core, module) {
   graspatlas::bind_quality(module);
   graspatlas::bind_collision(module);
   graspatlas::bind_climb(module);
+  graspatlas::bind_reach(module);
   graspatlas::bind_render(module);
 }

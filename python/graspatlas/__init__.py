@@ -66,6 +66,7 @@ if typing.TYPE_CHECKING:
     from graspatlas.requirements.force_closure import ForceClosure
     from graspatlas.requirements.holding_force import HoldingForce
     from graspatlas.requirements.joint_margin import JointMargin
+    from graspatlas.requirements.reachable import Reachable
     from graspatlas.requirements.rejections import Rejection
     from graspatlas.result.gap import Gap
     from graspatlas.result.refinement import Refinement, SearchReport
@@ -90,11 +91,13 @@ if typing.TYPE_CHECKING:
         plot_planar_grasp,
         plot_planar_indices,
     )
+    from graspatlas.world.arm import Arm
     from graspatlas.world.obstacle import Obstacle
     from graspatlas.world.pose import Pose
 
 __all__ = [
     "Approach",
+    "Arm",
     "Atlas",
     "Body",
     "Climb",
@@ -126,6 +129,7 @@ __all__ = [
     "Proposal",
     "Proposals",
     "ProposalsEnd",
+    "Reachable",
     "Recording",
     "Refinement",
     "Region",
@@ -231,6 +235,7 @@ _HOMES: dict[str, tuple[str, ...]] = {
     "requirements.force_closure": ("ForceClosure",),
     "requirements.holding_force": ("HoldingForce",),
     "requirements.joint_margin": ("JointMargin",),
+    "requirements.reachable": ("Reachable",),
     "requirements.rejections": ("Rejection",),
     "result.gap": ("Gap",),
     "result.refinement": ("Refinement", "SearchReport"),
@@ -255,6 +260,7 @@ _HOMES: dict[str, tuple[str, ...]] = {
         "plot_planar_grasp",
         "plot_planar_indices",
     ),
+    "world.arm": ("Arm",),
     "world.obstacle": ("Obstacle",),
     "world.pose": ("Pose",),
 }

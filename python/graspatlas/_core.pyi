@@ -31,6 +31,7 @@ __all__: list[str] = [
     "PlanePatch",
     "Polytope",
     "PythonSystem",
+    "ReachBatch",
     "RevolutionPatch",
     "Rotations",
     "Sphere",
@@ -754,6 +755,35 @@ class Measure:
     def any_thread(self) -> bool:
         """
         False where it asks Python.
+        """
+
+class ReachBatch:
+    """
+    An arm with a hand that looks for its postures; safe to call from any number of threads.
+    """
+    def __init__(
+        self,
+        model: Model,
+        joint: typing.SupportsInt | typing.SupportsIndex,
+        frame: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
+        lower: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+        upper: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+        scene: CollisionBatch,
+        arm_at: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
+        hand_at: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
+        seeds: typing.SupportsInt | typing.SupportsIndex,
+        postures: typing.SupportsInt | typing.SupportsIndex,
+    ) -> None:
+        """
+        From the arm alone, the joint that carries its frame, the frame in it [4 x 4], the limits [nq], the collisions of arm and hand, and where their numbers stand there; see reach_batch.hpp.
+        """
+    def solve(
+        self,
+        targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        hand: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> dict[str, numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]]:
+        """
+        Postures q [n x nq] that bring the frame to targets [n x 4 x 4] with the hand at its postures [n x hand], NaN where none was found; statuses [n] (0 found, 1 no posture, 2 all hit something) and, of the latter, the pairs of shapes that hit.
         """
 
 def available_threads() -> int:

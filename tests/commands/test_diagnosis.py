@@ -255,3 +255,14 @@ def test_patches_that_lie_off_the_shapes_are_pointed_out():
 @pytest.mark.parametrize("name", slow_but(ga.bundled_problems(), *FEW))
 def test_the_bundled_patches_lie_on_the_shapes(name):
     assert found(ga.load_problem(name), "shapes at x1").mark == OK
+
+
+def test_the_arm_is_looked_at(can: ga.Problem) -> None:
+    arm = ga.Arm.named("ur5_robot", "tool0", object=ga.Pose([0.5, 0.2, 0.4]))
+    near = found(replace(can, arm=arm), "arm at x1")
+    assert near.mark == OK
+    assert near.text == "ur5_robot, 6 joints up to tool0: a posture was found"
+    far = found(replace(can, arm=replace(arm, object=ga.Pose([2.0, 0.0, 0.0]))), "arm at x1")
+    assert far.mark == NOTE
+    assert "no posture was found within the joint limits, which is no proof" in far.text
+    assert "arm at x1" not in {finding.subject for finding in diagnose(can)}

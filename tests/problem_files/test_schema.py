@@ -19,9 +19,10 @@ PAGE = (ROOT / "docs" / "problem_files.md").read_text(encoding="utf-8")
 
 
 def test_the_example_of_the_documentation_holds():
-    text, obstacles = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+    text, obstacles, arm = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
     problem = read_problem(text, "example.yaml")
     assert len(read_problem(text + obstacles, "example.yaml").obstacles) == 3
+    assert read_problem(text + arm, "example.yaml").arm.flange == "tool0"
     result = ga.optimize(problem)
     assert result.is_global
     assert 100 < result.accepted.sum() < len(result.accepted)
@@ -30,7 +31,7 @@ def test_the_example_of_the_documentation_holds():
 
 def test_the_documentation_names_every_field():
     schema = json_schema()
-    for table in ("problem", "HandTable", "ObjectTable", "ContactTable", "MotionsTable", "FirstGraspTable"):
+    for table in ("problem", "HandTable", "ObjectTable", "ArmTable", "ContactTable", "MotionsTable", "FirstGraspTable"):
         for field in (schema if table == "problem" else schema["$defs"][table])["properties"]:
             assert field.endswith("_text") or re.search(rf"\b{field}\b", PAGE), f"{table}.{field}"
 

@@ -225,7 +225,7 @@ def test_a_class_enters_itself_under_its_name():
             name: ClassVar[str] = "upright"
             cost: ClassVar[int] = 1
 
-        dearest = ["collision_free", "holding_force"]
+        dearest = ["collision_free", "holding_force", "reachable"]
         assert list(ga.requirements.REQUIREMENTS) == ["joint_margin", "force_closure", "upright", *dearest]
         made = parse_requirement("upright:0.25")
         assert made == Upright(0.25)
@@ -239,7 +239,7 @@ def test_named_requirements_are_known_wherever_a_problem_is_read():
     """A problem reads requirements that it does not import: with the class of problems come all of them."""
     code = "import graspatlas as ga; ga.Problem; print(*ga.problem.requirement.REQUIREMENTS)"
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert printed.split() == ["joint_margin", "force_closure", "collision_free", "holding_force"]
+    assert printed.split() == ["joint_margin", "force_closure", "collision_free", "holding_force", "reachable"]
 
 
 def test_what_is_only_stated_cannot_be_checked(can):

@@ -20,6 +20,7 @@ from graspatlas.viewer.scene import bodies, meshes
 from graspatlas.viewer.scene import stick_figure as sketch
 from graspatlas.viewer.scene import velocity_ellipsoid as ellipsoid
 from graspatlas.viewer.scene.scene import CONTACT_RADIUS, Scene, grasp_parts, upright_parts
+from graspatlas.viewer.web.page import commands
 
 Array = NDArray[np.float64]
 
@@ -205,3 +206,27 @@ def test_the_table_is_level_with_the_grasp_on_it(small_result: ga.Result, normal
     assert height == pytest.approx(0.1 * normal[2], abs=1e-8), (
         "the object's origin is as far above it as in its own frame"
     )
+
+
+def test_the_arm_is_drawn_behind_the_best_grasp_and_see_through(small_result: ga.Result) -> None:
+    arm = ga.Arm.named("ur5_robot", "tool0", palm=ga.Pose([0, 0, 0.02]), object=ga.Pose([0.4, 0.2, 0.4]))
+    result = replace(small_result, problem=replace(small_result.problem, arm=arm))
+    positions, grasp = result.best.arm_positions(), result.best
+    parts = [part for part in Scene(result, worst=False).exhibits[0].parts if part.group == "arm"]
+    assert len(parts) == 8
+    assert all(0.0 < part.colour[3] < 0.6 for part in parts)
+    # The last link's mesh is where the arm's kinematics have it, seen from the palm.
+    T_base_link = arm.robot.link_placements(arm.robot.configuration(positions))["wrist_3_link"]
+    T_palm_base = grasp.T_palm_object @ np.linalg.inv(arm.T_base_object)
+    drawn = list(bodies.BodyShapes(result.problem).arm(grasp))
+    assert_allclose(drawn[-2][1], T_palm_base @ T_base_link, atol=1e-12)
+    assert_allclose(drawn[-2][1][:3, 3], np.linalg.inv(arm.T_flange_palm)[:3, 3] - [0.0, 0.0, 0.0823], atol=1e-9)
+    bare, shown = Scene(small_result, worst=False), Scene(result, worst=False)
+    assert_allclose(shown.camera(1.5, (-0.9, 0.9, -0.5, 0.8)).target, bare.camera(1.5, (-0.9, 0.9, -0.5, 0.8)).target)
+    for scene, count in ((Scene(result), 0), (Scene(result, arm=True), 8)):
+        best, worst = ([part for part in exhibit.parts if part.group == "arm"] for exhibit in scene.exhibits)
+        assert (len(best), len(worst)) == (count, 0)
+    paths = [command.get("path") for command in commands(Scene(result, arm=True))]
+    assert "/graspatlas/best/arm" in paths
+    away = replace(result.problem, arm=replace(arm, object=ga.Pose([3.0, 0.0, 0.0])))
+    assert not list(bodies.BodyShapes(away).arm(replace(grasp, problem=away)))

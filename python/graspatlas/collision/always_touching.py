@@ -24,6 +24,8 @@ __all__ = ["with_touching_links_allowed"]
 
 #: Postures that are drawn, and the share of them in which links touch that always do.
 POSTURES, ALWAYS = 300, 0.95
+#: The first of them tell most pairs apart: those that touch in less than a half of them do not always touch.
+FIRST, HALF = 30, 0.5
 #: How far away the object is put that a collision checker needs [m].
 FAR = 100.0
 #: How far a joint without limits is turned to either side [rad].
@@ -54,9 +56,10 @@ def with_touching_links_allowed(hand: Hand) -> tuple[Hand, tuple[tuple[str, str]
     q = _postures(hand)
     pose = np.array(problem.object_joint_model.neutral)
     pose[0] = FAR
-    touching = (checker.clearances(np.hstack([q, np.broadcast_to(pose, (len(q), len(pose)))]), chosen) < 0.0).mean(
-        axis=0
-    )
+    X = np.hstack([q, np.broadcast_to(pose, (len(q), len(pose)))])
+    often = (checker.clearances(X[:FIRST], chosen) < 0.0).mean(axis=0) >= HALF
+    chosen = [pair for pair, touches in zip(chosen, often, strict=True) if touches]
+    touching = (checker.clearances(X, chosen) < 0.0).mean(axis=0)
     links = {shape.name: shape.link for shape in checker.shapes}
     always = {
         tuple(sorted((links[a], links[b])))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from graspatlas.problem.problem import Problem
     from graspatlas.world.obstacle import Obstacle
 
-__all__ = ["CollisionShapes", "ObstacleShape", "collision_shapes"]
+__all__ = ["CollisionShapes", "ObstacleShape", "body_shapes", "collision_shapes", "may_touch", "obstacle_shapes"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,26 +72,26 @@ def collision_shapes(problem: Problem) -> CollisionShapes:
     Raises:
         GraspAtlasError: If hand, object or an obstacle has no collision shape, or a mesh or the SRDF cannot be read.
     """
-    hand = _shapes(problem.hand, problem.hand.tree)
-    of_object = _shapes(problem.object, problem.object.urdf)
+    hand = body_shapes(problem.hand, problem.hand.tree)
+    of_object = body_shapes(problem.object, problem.object.urdf)
     touching = tuple(_touching(hand, problem, contact.frame) for contact in problem.contacts)
-    obstacles = tuple(shape for obstacle in problem.obstacles for shape in _obstacle_shapes(obstacle))
-    return CollisionShapes(hand, of_object, obstacles, _ignored(hand, problem.hand), touching)
+    obstacles = tuple(shape for obstacle in problem.obstacles for shape in obstacle_shapes(obstacle))
+    return CollisionShapes(hand, of_object, obstacles, may_touch(hand, problem.hand), touching)
 
 
-def _obstacle_shapes(obstacle: Obstacle) -> Iterator[ObstacleShape]:
+def obstacle_shapes(obstacle: Obstacle) -> Iterator[ObstacleShape]:
     """Shapes of an obstacle, each named after it."""
     on_object, T = obstacle.frame == "object", obstacle.T_frame_shape
     if obstacle.body is None:
         yield ObstacleShape(Shape("half_space", name=obstacle.name, placement=T), on_object)
         return
-    shapes = _shapes(obstacle.body, obstacle.body.urdf)
+    shapes = body_shapes(obstacle.body, obstacle.body.urdf)
     for i, shape in enumerate(shapes):
         name = obstacle.name if len(shapes) == 1 else f"{obstacle.name}_{i}"
         yield ObstacleShape(replace(shape, name=name, placement=T @ shape.placement), on_object)
 
 
-def _shapes(body: Body, tree: str) -> tuple[Shape, ...]:
+def body_shapes(body: Body, tree: str) -> tuple[Shape, ...]:
     """Collision shapes of a body, convex meshes as solids."""
     check_meshes(body)
     try:
@@ -104,7 +104,7 @@ def _shapes(body: Body, tree: str) -> tuple[Shape, ...]:
     return tuple(map(convex_solid, shapes))
 
 
-def _ignored(shapes: tuple[Shape, ...], hand: Hand) -> frozenset[tuple[int, int]]:
+def may_touch(shapes: tuple[Shape, ...], hand: Hand) -> frozenset[tuple[int, int]]:
     """Pairs of the hand's shapes that may touch; without an SRDF those of neighbouring joints may."""
     listed = _disabled(hand)
     return frozenset(

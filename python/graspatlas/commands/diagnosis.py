@@ -90,7 +90,7 @@ def diagnose(problem: Problem, *, dimension: int | None = None, radius: float | 
     findings.append(_rank(problem))
     k = dimension or problem.defaults.get("dimension") or min(2, t)
     findings += [*_motions(problem, k), *_contacts(problem), *_limits(problem), *_redundancies(problem)]
-    findings += [*_shapes(problem), _collision(problem), _defaults(problem)]
+    findings += [*_shapes(problem), _collision(problem), *_arm(problem), _defaults(problem)]
     r = radius or problem.defaults.get("radius")
     if r is not None and all(finding.mark != PROBLEM for finding in findings if finding.subject == "hand motions"):
         findings.append(_charts(problem, int(k), float(r)))
@@ -308,6 +308,20 @@ def _collision(problem: Problem) -> Finding:
         return Finding(OK, "collision at x1", "none", "other grasps may collide: require collision_free")
     hint = "not forbidden, but collision_free will refuse x1; list pairs that may touch in an SRDF, or move x1"
     return Finding(NOTE, "collision at x1", f"{hit[0]} and {hit[1]}", hint)
+
+
+def _arm(problem: Problem) -> Iterator[Finding]:
+    """Whether the arm, if there is one, brings the hand to x1."""
+    if problem.arm is None:
+        return
+    what = f"{problem.arm.name}, {len(problem.arm.joints)} joints up to {problem.arm.flange}"
+    try:
+        Grasps(problem, problem.x1_array)[0].arm_positions()
+    except GraspAtlasError as error:
+        hint = "not forbidden, but reachable will refuse x1; other grasps may be reached"
+        yield Finding(NOTE, "arm at x1", f"{what}: {error}", hint)
+        return
+    yield Finding(OK, "arm at x1", f"{what}: a posture was found", "of other grasps none may be: require reachable")
 
 
 def _defaults(problem: Problem) -> Finding:

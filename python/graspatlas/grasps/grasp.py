@@ -19,6 +19,7 @@ from graspatlas.execution.contact_forces import ContactForces, ForceOptions, con
 from graspatlas.execution.pregrasp import DISTANCE, Pregrasp, pregrasps
 from graspatlas.execution.squeeze import Stiffness, squeeze
 from graspatlas.grasps.poses import inverse, poses_by_name, quaternions, se3
+from graspatlas.reach.reach import ReachStatus, arm_reach
 from graspatlas.support.arrays import Array
 
 if TYPE_CHECKING:
@@ -175,6 +176,31 @@ class Grasp:
         forces, at = self.contact_forces(**options), {j: np.float64(q) for j, q in self.joint_positions.items()}
         targets = squeeze(self.problem.hand, at, forces, stiffness)
         return {name: float(target) for name, target in targets.items()}
+
+    def arm_positions(self, clearance: float = 0.0) -> dict[str, float]:
+        """Joint positions by name [rad or m] with which the problem's arm brings the hand to this grasp.
+
+        They are within the joint limits, and nothing is hit; the way there is not looked at. See
+        :class:`graspatlas.Reachable`.
+
+        Args:
+            clearance: Distance that the arm's links must keep from the hand, the object and obstacles [m].
+
+        Raises:
+            GraspAtlasError: If none were found, the problem has no arm, or something has no collision shape.
+        """
+        reach = arm_reach(self.problem, clearance).look(self.q[None], self.T_palm_object[None])
+        if reach.found[0]:
+            return {name: float(positions[0]) for name, positions in reach.positions.items()}
+        hits = reach.hits[0]
+        if reach.statuses[0] is ReachStatus.HITS and hits is not None:
+            why = f"in each posture found something is hit, in the first {hits[0]} and {hits[1]}"
+        else:
+            why = "no posture was found within the joint limits, which is no proof that there is none"
+        raise GraspAtlasError(
+            f"arm '{reach.arm.name}' does not bring the hand to this grasp: {why}; take a grasp that meets "
+            "the requirement reachable, or move the base or the object"
+        )
 
     def pregrasp(self, distance: float = DISTANCE, *, touch_depth: float = 0.002, clearance: float = 0.0) -> Pregrasp:
         """The posture of the hand before this grasp: each contact point off the object by the same distance.

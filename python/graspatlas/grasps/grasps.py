@@ -16,6 +16,7 @@ from graspatlas.execution.pregrasp import DISTANCE, Pregrasp, pregrasps
 from graspatlas.execution.squeeze import Stiffness, squeeze
 from graspatlas.grasps.grasp import Grasp
 from graspatlas.grasps.poses import inverse, poses_by_name, quaternions
+from graspatlas.reach.reach import Reach, arm_reach
 from graspatlas.support.arrays import Array
 from graspatlas.support.pickling import Light
 from graspatlas.support.validation import number_array, read_only
@@ -197,6 +198,21 @@ class Grasps(Light):
         """
         depths = {"touch_depth": touch_depth, "clearance": clearance}
         return pregrasps(self.problem, self.x, distance, **depths, progress=progress)
+
+    def reach(self, clearance: float = 0.0) -> Reach:
+        """Where the problem's arm can bring the hand: its postures at the grasps; see :class:`graspatlas.Reachable`.
+
+        Args:
+            clearance: Distance that the arm's links must keep from the hand, the object and obstacles [m].
+
+        Raises:
+            GraspAtlasError: If the problem has no arm, or something has no collision shape.
+        """
+        return arm_reach(self.problem, clearance).look(self.q, self.T_palm_object)
+
+    def arm_positions(self, clearance: float = 0.0) -> dict[str, Array]:
+        """Joint positions of the arm by name, (n,) each [rad or m], NaN where none were found; see :meth:`reach`."""
+        return self.reach(clearance).positions
 
     def __getitem__(self, i: int) -> Grasp:
         one = Grasps(self.problem, self.x[i], self.system) if len(self) > 1 else self  # computed for this grasp alone

@@ -21,6 +21,7 @@ __all__ = [
     "fixed_parents",
     "joint_limits",
     "joints_of_kind",
+    "joints_on_way",
     "lock_joints",
     "mesh_urdf",
     "mimics",
@@ -30,6 +31,7 @@ __all__ = [
     "sphere_urdf",
     "velocity_limits",
     "with_followers_limited",
+    "without_visuals",
 ]
 
 #: Joints that move with one degree of freedom.
@@ -176,6 +178,22 @@ def fixed_parents(urdf: str) -> dict[str, str]:
     }
 
 
+def joints_on_way(urdf: str, link: str) -> tuple[str, ...]:
+    """Names of the moving joints between the root link and another, from the root on.
+
+    Args:
+        urdf: Text of a URDF.
+        link: Name of the link.
+    """
+    carriers = {_link_of(joint, "child"): joint for joint in ElementTree.fromstring(urdf).findall("joint")}
+    way = []
+    while (joint := carriers.pop(link, None)) is not None:
+        if joint.get("type") != "fixed":
+            way.append(str(joint.get("name")))
+        link = _link_of(joint, "parent")
+    return tuple(reversed(way))
+
+
 def mimics(urdf: str) -> tuple[Mimic, ...]:
     """The joints that mimic others; see :func:`graspatlas.hand.mechanism.read_mimics`.
 
@@ -202,6 +220,19 @@ def with_followers_limited(urdf: str) -> str:
             joint.remove(limit)
         ElementTree.SubElement(joint, "limit", {"lower": "0", "upper": "0", "effort": "0", "velocity": "0"})
     return ElementTree.tostring(root, encoding="unicode") if changed else urdf
+
+
+def without_visuals(urdf: str) -> str:
+    """The URDF without what is to be seen alone.
+
+    Args:
+        urdf: Text of a URDF.
+    """
+    root = ElementTree.fromstring(urdf)
+    for link in root.findall("link"):
+        for visual in link.findall("visual"):
+            link.remove(visual)
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def lock_joints(urdf: str, positions: Mapping[str, float]) -> str:

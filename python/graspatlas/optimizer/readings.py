@@ -16,6 +16,7 @@ from graspatlas.grasps.grasps import Grasps
 from graspatlas.optimizer.options import Choices
 from graspatlas.problem.problem import Problem
 from graspatlas.problem.requirement import StatedRequirement
+from graspatlas.problem.validation import check_arm
 from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.quality.evaluation import evaluate
 from graspatlas.requirements.base import RequirementLike
@@ -82,8 +83,9 @@ class Reading:
         Only functions of one grasp are asked: one that takes a batch may need more than one.
 
         Raises:
-            GraspAtlasError: If one fails.
+            GraspAtlasError: If one fails, or a requirement asks for an arm that the problem does not have.
         """
+        check_arm(problem.name, problem.arm, [r for r in self.requirements if isinstance(r, StatedRequirement)])
         grasp = Grasps(problem, x, system, [0])
         for index in self.indices:
             if callable(index) and not is_batched(index):

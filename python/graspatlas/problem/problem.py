@@ -32,6 +32,7 @@ from graspatlas.problem.requirement import StatedRequirement, requirement_from_d
 from graspatlas.problem.torque_lengths import largest_arm
 from graspatlas.problem.validation import (
     DEFAULTS,
+    check_arm,
     check_bounds,
     check_freedom,
     check_joints,
@@ -46,6 +47,7 @@ from graspatlas.problem.validation import (
 from graspatlas.support.arrays import Array
 from graspatlas.support.pickling import Light
 from graspatlas.support.validation import PlainTable, StatedTable, checked_table, number, number_array, read_only, shown
+from graspatlas.world.arm import Arm
 from graspatlas.world.obstacle import Obstacle
 
 __all__ = ["Problem"]
@@ -79,6 +81,7 @@ class Problem(Light):
         defaults: ``dimension``, ``radius``, ``epsilon`` and ``quality`` to use when the caller names none.
         requirements: What the best grasp must meet when the caller does not say.
         obstacles: What the hand must not touch beside the object: they count wherever collisions are looked at.
+        arm: The arm that carries the hand, for the requirement ``reachable``; none by default.
         description, source: For people.
 
     Raises:
@@ -101,6 +104,7 @@ class Problem(Light):
     pose_guess: PoseGuess | None = None
     torque_length: float | None = None
     obstacles: tuple[Obstacle, ...] = ()
+    arm: Arm | None = None
 
     def __post_init__(self) -> None:
         check_types(vars(self), self.contacts)
@@ -111,6 +115,7 @@ class Problem(Light):
         object.__setattr__(self, "requirements", tuple(self.requirements))
         check_obstacles(self.obstacles)
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
+        check_arm(self.name, self.arm, self.requirements)
         if not self.contacts:
             raise GraspAtlasError(f"problem '{self.name}' has no contact")
         check_lengths(self.length_scale, self.torque_length)
@@ -355,6 +360,8 @@ class Problem(Light):
             table["requirements"] = [requirement.to_dict() for requirement in self.requirements]
         if self.obstacles:
             table["obstacles"] = [obstacle.to_dict() for obstacle in self.obstacles]
+        if self.arm is not None:
+            table["arm"] = self.arm.to_dict()
         if self.torque_length is not None:
             table["torque_length"] = self.torque_length
         if self.reference is not None:
@@ -382,6 +389,7 @@ class Problem(Light):
             "x1",
             "reference",
             "obstacles",
+            "arm",
         )
         table = checked_table(data, "the problem", ("name", "hand", "object", "contacts"), (*optional, "torque_length"))
         body = dict(checked_table(table["object"], "the object", ("urdf",), None))
@@ -404,6 +412,7 @@ class Problem(Light):
             defaults=dict(checked_table(table.get("defaults") or {}, "defaults", (), DEFAULTS)),
             requirements=tuple(map(requirement_from_dict, table.get("requirements") or ())),
             obstacles=tuple(Obstacle.from_dict(item, folder) for item in table.get("obstacles") or ()),
+            arm=Arm.from_dict(table["arm"], folder) if table.get("arm") is not None else None,
             description=str(table.get("description", "")),
             source=str(table.get("source", "")),
         )

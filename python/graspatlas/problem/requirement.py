@@ -25,10 +25,12 @@ class StatedRequirement:
 
     Attributes:
         cost: The cheaper ones are checked first.
+        needs_arm: Only problems with an arm can meet it.
     """
 
     name: ClassVar[str] = ""
     cost: ClassVar[int] = 0
+    needs_arm: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         """Enter the class under its name, if it has one of its own."""

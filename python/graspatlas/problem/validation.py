@@ -15,12 +15,15 @@ from graspatlas.problem.contacts import Contact
 from graspatlas.problem.first_grasp import FirstGrasp, posture_array
 from graspatlas.problem.object_joint import ObjectJoint
 from graspatlas.problem.pose_guess import PoseGuess
+from graspatlas.problem.requirement import StatedRequirement
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import checked_instance, checked_table, number
+from graspatlas.world.arm import Arm
 from graspatlas.world.obstacle import Obstacle
 
 __all__ = [
     "DEFAULTS",
+    "check_arm",
     "check_bounds",
     "check_freedom",
     "check_joints",
@@ -80,6 +83,17 @@ def check_obstacles(obstacles: Sequence[Obstacle]) -> None:
         if obstacle.name in names:
             raise GraspAtlasError(f"two obstacles are called '{obstacle.name}'; give each a name of its own")
         names.add(obstacle.name)
+
+
+def check_arm(name: str, arm: Arm | None, requirements: Sequence[StatedRequirement]) -> None:
+    """Raise GraspAtlasError unless a problem's arm is one, and there where a requirement asks for it."""
+    checked_instance(arm, (Arm, type(None)), "arm", "Arm.named")
+    for requirement in requirements:
+        if requirement.needs_arm and arm is None:
+            raise GraspAtlasError(
+                f"requirement {requirement.name} asks what an arm can bring about, but problem '{name}' has no arm; "
+                "state one, such as arm: {example_robot_data: ur5_robot, flange: tool0, ...}"
+            )
 
 
 def check_poses(joint: ObjectJoint, x1: FirstGrasp | None, guess: PoseGuess | None) -> None:

@@ -26,6 +26,7 @@ from graspatlas.problem_files.faults import ProblemFileError, faults_of_validati
 from graspatlas.problem_files.mesh_patches import PatchesOfMeshes
 from graspatlas.problem_files.postures import read_postures
 from graspatlas.problem_files.schema import (
+    ArmTable,
     ContactTable,
     HandTable,
     MotionsTable,
@@ -36,6 +37,7 @@ from graspatlas.problem_files.schema import (
 )
 from graspatlas.problem_files.schema_tables import Table
 from graspatlas.requirements.named import requirement_from_dict
+from graspatlas.world.arm import POSES, Arm
 from graspatlas.world.obstacle import Obstacle, mesh_body
 from graspatlas.world.pose import Pose
 
@@ -115,7 +117,8 @@ class _Reading:
 
     def problem(self, table: ProblemTable) -> Problem:
         """The problem itself."""
-        full, hand = self._hand(table.hand)
+        with self._within("hand"):
+            full, hand = self._hand(table.hand, "hand")
         with self._within("object"):
             body = self._object(table.object)
         meshes = PatchesOfMeshes(self.folder, tuple(table.object.package_paths), body, table.object.scale is not None)
@@ -129,6 +132,7 @@ class _Reading:
                 motions = self._motions(table.hand_motions, hand, moving_joints(full.urdf))
         requirements = tuple(self._requirement(i, requirement) for i, requirement in enumerate(table.requirements))
         obstacles = self.obstacles(table.obstacles)
+        arm = self._arm(table.arm) if table.arm is not None else None
         stated = self.document.data
         if stated.get("x1") is not None:
             with self._within("x1"):
@@ -151,21 +155,29 @@ class _Reading:
                 pose_guess=guess,
                 torque_length=stated.get("torque_length"),
                 obstacles=obstacles,
+                arm=arm,
             )
 
     def obstacles(self, tables: Sequence[ObstacleTable]) -> tuple[Obstacle, ...]:
         """The obstacles."""
         return tuple(self._obstacle(i, table) for i, table in enumerate(tables))
 
-    def _hand(self, table: HandTable) -> tuple[Hand, Hand]:
+    def _hand(self, table: HandTable, field: str) -> tuple[Hand, Hand]:
         """The hand as its URDF has it, and the one with only those joints that move."""
-        with self._within("hand"):
-            full = self._whole_hand(table)
-            hand = full.with_joints(table.joints, table.locked)
-            if table.enlarge_limits:
-                hand = hand.with_limits_enlarged(table.enlarge_limits)
-            _ = hand.mechanism
-            return full, hand
+        full = self._whole_hand(table, field)
+        hand = full.with_joints(table.joints, table.locked)
+        if table.enlarge_limits:
+            hand = hand.with_limits_enlarged(table.enlarge_limits)
+        _ = hand.mechanism
+        return full, hand
+
+    def _arm(self, table: ArmTable) -> Arm:
+        poses = {}
+        for name in POSES:
+            with self._within("arm", name):
+                poses[name] = Pose(**getattr(table, name).model_dump())
+        with self._within("arm"):
+            return Arm(self._hand(table, "arm")[1], table.flange, **poses)
 
     def _contact(self, i: int, table: ContactTable, hand: Hand, meshes: PatchesOfMeshes) -> Contact:
         stated = self.document.data["contacts"][i]
@@ -189,7 +201,7 @@ class _Reading:
                 return Obstacle(table.name, None, table.plane.normal, table.frame, pose)
             return Obstacle(table.name, self._object(table), None, table.frame, pose)
 
-    def _whole_hand(self, table: HandTable) -> Hand:
+    def _whole_hand(self, table: HandTable, field: str) -> Hand:
         """The hand as its URDF has it, with the limits that are stated."""
         plain = table.model_dump(
             include={"name", "urdf", "srdf", "urdf_text", "srdf_text", "package_paths", "limits"}, exclude_none=True
@@ -197,10 +209,10 @@ class _Reading:
         if table.mjcf is not None:
             return self._from_mjcf(table.mjcf, table)
         if table.example_robot_data is not None:
-            with self._within("hand", "example_robot_data"):
+            with self._within(field, "example_robot_data"):
                 plain["urdf"] = example_robot(table.example_robot_data)
         if table.robot_descriptions is not None:
-            with self._within("hand", "robot_descriptions"):
+            with self._within(field, "robot_descriptions"):
                 path, folders = described_robot(table.robot_descriptions)
             if is_mjcf(path):
                 return self._from_mjcf(path, table)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Union, get_type_hints
+from typing import Annotated, Any, ClassVar, Literal, Union, get_type_hints
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
 from pydantic_core import PydanticCustomError
@@ -45,6 +45,8 @@ class BodyTable(Table):
 class HandTable(BodyTable):
     """The hand. The root of its URDF is the palm, and the world."""
 
+    what: ClassVar[str] = "the hand"
+
     mjcf: str | None = Field(
         None, description="Path of an MJCF file, absolute or relative to this file; needs graspatlas[mujoco]."
     )
@@ -75,7 +77,7 @@ class HandTable(BodyTable):
 
     @model_validator(mode="after")
     def _one_source(self) -> HandTable:
-        exactly_one(self, HAND_SOURCES, "the hand")
+        exactly_one(self, HAND_SOURCES, self.what)
         if self.root is not None and self.mjcf is None and self.robot_descriptions is None:
             message = "root names the palm of an MJCF; a URDF has its own: lock joints instead"
             raise PydanticCustomError("root_of_urdf", "{message}", {"message": message})
@@ -168,6 +170,30 @@ class ObstacleTable(BodyTable):
             message = "scale is for a mesh; state other sizes in metres"
             raise PydanticCustomError("scale_of_shape", "{message}", {"message": message})
         return self
+
+
+class PoseTable(Table):
+    """Where one frame is in another."""
+
+    xyz: Vector = Field([0.0, 0.0, 0.0], description="Its position [m].")
+    quat_xyzw: Quaternion = Field([0.0, 0.0, 0.0, 1.0], description="Its rotation; it is normalised.")
+
+
+class ArmTable(HandTable):
+    """The arm that carries the hand, and where it stands. It is read as a hand is; the root of its URDF is the base."""
+
+    what: ClassVar[str] = "the arm"
+    flange: str = Field(description="Link of the arm that carries the hand, such as tool0.")
+    palm: PoseTable = Field(
+        default_factory=lambda: PoseTable.model_validate({}), description="Pose of the palm in the flange's frame."
+    )
+    base: PoseTable = Field(
+        default_factory=lambda: PoseTable.model_validate({}), description="Pose of the arm's base in the world."
+    )
+    object: PoseTable = Field(
+        default_factory=lambda: PoseTable.model_validate({}),
+        description="Pose of the object in the world, when it is grasped; by default the world is the object's frame.",
+    )
 
 
 class MotionsTable(Table):
@@ -344,6 +370,9 @@ class ProblemTable(Table):
     )
     obstacles: list[ObstacleTable] = Field(
         default_factory=list, description="What the hand must not touch beside the object, such as a table."
+    )
+    arm: ArmTable | None = Field(
+        None, description="The arm that carries the hand, for the requirement reachable; none by default."
     )
 
 

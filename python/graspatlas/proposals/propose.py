@@ -10,6 +10,7 @@ from pathlib import Path
 from graspatlas.cluster.workers import check_workers
 from graspatlas.errors import GraspAtlasError
 from graspatlas.hand.named_hands import named_hand
+from graspatlas.problem.requirement import StatedRequirement
 from graspatlas.problem.validation import check_obstacles
 from graspatlas.proposals.assignments.matching import Assignment
 from graspatlas.proposals.files import folder_name, problem_file, write_text
@@ -112,6 +113,7 @@ def propose(
     check_requirements(require)
     check_obstacles(obstacles)
     _check_requirements_see(obstacles, on_table, require)
+    _check_no_arm(require)
     whole(seed, "seed", 0)
     looker: Looker = here
     if workers is not None or scheduler is not None:
@@ -158,6 +160,16 @@ def _check_requirements_see(obstacles: Sequence[Obstacle], on_table: bool, requi
     """Raise GraspAtlasError where there are obstacles that no requirement looks at."""
     if (obstacles or on_table) and not any(isinstance(each, CollisionFree) for each in require):
         raise GraspAtlasError("obstacles count where grasps must be free of collision: require collision_free too")
+
+
+def _check_no_arm(require: Sequence[RequirementLike]) -> None:
+    """Raise GraspAtlasError where a requirement asks for an arm."""
+    for each in require:
+        if isinstance(each, StatedRequirement) and each.needs_arm:
+            raise GraspAtlasError(
+                f"requirement {each.name} asks what an arm can bring about, and proposals know of none: leave it out, "
+                "and state the arm in the problem file of a proposal"
+            )
 
 
 def _schedule(start: float, deadline: float, top: int) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from graspatlas.problem.problem import Problem
 from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.quality.evaluation import evaluate
 from graspatlas.requirements.base import RequirementLike
+from graspatlas.requirements.reachable import Reachable
 from graspatlas.requirements.rejections import Rejection, nearest, rejections
 from graspatlas.requirements.screening import screen
 from graspatlas.result.gap import Gap, estimate_gap
@@ -286,6 +287,19 @@ class GraspAtlas(Light):
                 f"chart {chart!r} does not exist; the atlas has charts 0 to {self.atlas.n_charts - 1}"
             )
         return int(chart)
+
+    @cached_property
+    def reachable(self) -> BoolArray:
+        """Which charts the problem's arm can bring about, whatever else is required of them [n].
+
+        The clearance is that of the requirement ``reachable``, 0 where that is not required. False says that no posture
+        of the arm was found, which is no proof that there is none; see :class:`graspatlas.Reachable`.
+
+        Raises:
+            GraspAtlasError: If the problem has no arm, or something has no collision shape.
+        """
+        required = next((r for r in self.requirements if isinstance(r, Reachable)), Reachable())
+        return read_only(required.met(Grasps(self.problem, self.atlas.centers, self.system)))
 
     def meets(self, X: ArrayLike) -> BoolArray:
         """Which configurations meet the requirements [n].

@@ -15,6 +15,7 @@ from graspatlas.grasps.columns import grasp_columns, parameter_columns
 from graspatlas.grasps.grasp import Grasp
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.quality.batched import quality_name
+from graspatlas.requirements.reachable import Reachable
 from graspatlas.result.exports import Choice, save_grasps
 from graspatlas.result.files import read_result, save_result
 from graspatlas.result.grasp_atlas import GraspAtlas
@@ -146,6 +147,14 @@ class Result(GraspAtlas):
             summary["nearest"] = self._summary_of_nearest()
         if self.others:
             summary["others"] = self._summary_of_others(best)
+        arm, asked = self.problem.arm, [str(r) for r in self.requirements if isinstance(r, Reachable)]
+        if arm is not None and asked:
+            reachable = int(self.accepted.sum())
+            summary["arm"] = {
+                "name": arm.name,
+                "reachable": reachable,
+                "of": reachable + sum(self.rejected[name] for name in asked),
+            }
         if self.refinement:
             summary["refined"] = self._summary_of_refinement()
         return summary

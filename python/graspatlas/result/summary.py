@@ -7,6 +7,7 @@ from typing import Any, TypedDict
 from typing_extensions import NotRequired
 
 __all__ = [
+    "ArmSummary",
     "AuditSummary",
     "GapSummary",
     "GraspSummary",
@@ -82,6 +83,14 @@ class NearestSummary(TypedDict):
     rejected_by: list[RejectionSummary]
 
 
+class ArmSummary(TypedDict):
+    """For how many charts a posture of the arm was found, of those that meet the other requirements."""
+
+    name: str
+    reachable: int
+    of: int
+
+
 class OtherSummary(TypedDict):
     """Another index at the best grasp, and its largest value over the grasps that meet the requirements."""
 
@@ -145,4 +154,5 @@ class ResultSummary(TypedDict):
     gap: GapSummary | None
     nearest: NotRequired[NearestSummary]
     others: NotRequired[dict[str, OtherSummary]]
+    arm: NotRequired[ArmSummary]
     refined: NotRequired[RefinementSummary]

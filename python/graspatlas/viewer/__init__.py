@@ -66,7 +66,7 @@ def view(
 
     shown = _checked(shown)
     _check_chart(shown, chart)
-    told = Scene(shown, worst=worst, chart=chart) if isinstance(shown, Result) else _film(shown)
+    told = Scene(shown, worst=worst, chart=chart, arm=True) if isinstance(shown, Result) else _film(shown)
     return show(told, open_browser=open_browser, wait=wait, host=host)
 
 

@@ -9,7 +9,7 @@ from graspatlas.optimizer.components import Components, SearchStatus
 from graspatlas.quality.batched import quality_name
 from graspatlas.result.refinement import Refinement, SearchEnd, SearchReport
 from graspatlas.result.result import Result
-from graspatlas.result.summary import GapSummary
+from graspatlas.result.summary import ArmSummary, GapSummary
 from graspatlas.support.arrays import Array
 
 __all__ = ["component_lines", "result_lines"]
@@ -53,6 +53,8 @@ def result_lines(result: Result, folder: Path | None) -> list[str]:
     if result.requirements:
         counts = ", ".join(f"{name} rejected {count}" for name, count in result.rejected.items())
         lines.append(f"  {result.accepted.sum()} grasps meet the requirements; checked in this order, {counts}")
+    if "arm" in summary:
+        lines.append(_arm_line(summary["arm"]))
     if result.accepted.any():
         lines += _best_lines(result)
     elif result.refinement:
@@ -90,6 +92,15 @@ def _gap_line(gap: GapSummary, n_charts: int) -> str:
     if gap["n_unknown"]:
         line += f"; too few neighbours to tell of {gap['n_unknown']} more"
     return line
+
+
+def _arm_line(arm: ArmSummary) -> str:
+    """What the arm can bring about."""
+    share = f" ({arm['reachable'] / arm['of']:.1%})" if arm["of"] else ""
+    return (
+        f"  arm {arm['name']}: a posture was found for {arm['reachable']} of the {arm['of']} grasps that meet the "
+        f"other requirements{share}; that none was found is no proof that there is none"
+    )
 
 
 def _best_lines(result: Result) -> list[str]:

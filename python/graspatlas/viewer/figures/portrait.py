@@ -1,4 +1,4 @@
-"""One grasp in three dimensions on white paper: hand, object, contact points and normals."""
+"""One grasp in three dimensions on white paper: hand, object, contact points and normals, and the arm behind."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from graspatlas.viewer.render.shading import Shadow, lamps, to_linear
 from graspatlas.viewer.scene.bodies import BodyShapes
 from graspatlas.viewer.scene.camera import Camera
 from graspatlas.viewer.scene.meshes import merged
-from graspatlas.viewer.scene.scene import SHOW_THROUGH, Part, upright_parts
+from graspatlas.viewer.scene.scene import SHOW_THROUGH, Part, arm_parts, levelled, upright_parts
 from graspatlas.viewer.scene.viewpoint import Subject, best_direction
 
 __all__ = ["common_direction", "portrait"]
@@ -58,7 +58,8 @@ def portrait(
     Raises:
         GraspAtlasError: If a mesh cannot be read.
     """
-    parts = _parts(BodyShapes(problem), grasp)
+    shapes = BodyShapes(problem)
+    parts = _parts(shapes, grasp) + levelled(grasp, arm_parts(shapes, grasp))
     towards = common_direction(problem, [grasp]) if direction is None else np.asarray(direction, float)
     camera = _framed(parts, towards, width / height)
     size = (width * SAMPLES, height * SAMPLES)
@@ -86,7 +87,7 @@ def _corners(parts: list[Part]) -> Array:
 
 def _framed(parts: list[Part], direction: Array, aspect: float) -> Camera:
     """Camera that fills its picture with the parts."""
-    points = _corners([part for part in parts if part.group != "obstacle"]).reshape(-1, 3)
+    points = _corners([part for part in parts if part.group not in ("obstacle", "arm")]).reshape(-1, 3)
     camera = Camera(points.mean(axis=0), direction, 1.0)
     for _ in range(30):
         seen = camera.project(points, aspect)[:, :2]

@@ -1,9 +1,9 @@
-"""Meshes of hand and object, read from their URDFs."""
+"""Meshes of hand, object, obstacles and arm, read from their URDFs."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,9 +11,11 @@ import numpy as np
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
+from graspatlas.grasps.grasp import Grasp
 from graspatlas.hand.body import Body
 from graspatlas.hand.embedded_meshes import mesh_folders
 from graspatlas.hand.mesh_files import check_meshes
+from graspatlas.hand.urdf import without_visuals
 from graspatlas.problem.problem import Problem
 from graspatlas.support.arrays import Array
 from graspatlas.viewer.scene.meshes import Mesh, box, from_shape
@@ -25,6 +27,8 @@ __all__ = ["BodyMeshes", "BodyShapes"]
 OBSTACLE = (0.36, 0.50, 0.62, 0.30)
 #: Opacity of what stands back behind something else that is shown.
 FADED = 0.16
+#: The same of arms.
+ARM = (0.62, 0.66, 0.72, 0.35)
 #: Side of the plates that stand for planes, as a multiple of the object's diagonal; their thickness as a share of that.
 PLATE, THIN = 1.2, 0.01
 
@@ -150,6 +154,30 @@ class BodyShapes:
                 self._obstacles[obstacle.name] = BodyMeshes(obstacle.body)
             for mesh, T_body_mesh, _ in self._obstacles[obstacle.name].at_rest():
                 yield mesh, T @ T_body_mesh, OBSTACLE
+
+    def arm(self, grasp: Grasp) -> Iterator[Shape]:
+        """The arm that brings the hand to a grasp, in the palm's frame; nothing where there is none, or none is found.
+
+        Its posture is that of :meth:`graspatlas.Grasp.arm_positions`, and its meshes are those of its collision shapes,
+        which have a tenth of the triangles.
+        """
+        arm = self.problem.arm
+        if arm is None:
+            return
+        try:
+            positions = grasp.arm_positions()
+        except GraspAtlasError:  # not to be reached, or of no collision shape, which is no reason to draw nothing
+            return
+        T_palm_base = grasp.T_palm_object @ np.linalg.inv(arm.T_base_object)
+        placements = arm.robot.link_placements(arm.robot.configuration(positions))
+        for mesh, T, _ in self._arm.on_links(placements):
+            yield mesh, T_palm_base @ T, ARM
+
+    @cached_property
+    def _arm(self) -> BodyMeshes:
+        assert self.problem.arm is not None
+        robot = self.problem.arm.robot
+        return BodyMeshes(replace(robot, urdf=without_visuals(robot.urdf)))
 
     @cached_property
     def _plate(self) -> float:

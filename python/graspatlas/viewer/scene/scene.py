@@ -31,11 +31,13 @@ __all__ = [
     "Exhibit",
     "Part",
     "Scene",
+    "arm_parts",
     "body_parts",
     "clash_of",
     "direction_to",
     "fitted_camera",
     "grasp_parts",
+    "levelled",
     "obstacle_parts",
     "outermost",
     "size_of",
@@ -92,7 +94,7 @@ class Part:
     """One mesh of one colour.
 
     Attributes:
-        group: ``hand``, ``object``, ``obstacle``, or what is drawn on top, a name in ``COLOURS``.
+        group: ``hand``, ``object``, ``obstacle``, ``arm``, or what is drawn on top, a name in ``COLOURS``.
         mesh: The mesh; the same one may stand in several parts.
         T: Its placement (4, 4).
         colour: Red, green, blue and opacity, each 0 to 1.
@@ -145,12 +147,15 @@ class Scene:
         result: The result.
         worst: Whether a second grasp is shown: the worst beside the best, or the best beside a chart.
         chart: The chart whose grasp is shown, in place of the worst.
+        arm: Whether the arm stands behind the best grasp; by default where that is alone, since it would be in the way.
 
     Raises:
         GraspAtlasError: If a mesh of the hand or the object cannot be read, or there is no such chart.
     """
 
-    def __init__(self, result: GraspAtlas, *, worst: bool = True, chart: int | None = None) -> None:
+    def __init__(
+        self, result: GraspAtlas, *, worst: bool = True, chart: int | None = None, arm: bool | None = None
+    ) -> None:
         self.result = result
         shapes = BodyShapes(result.problem)
         grasps = _shown(result, worst, chart)
@@ -163,6 +168,8 @@ class Scene:
             sides.append((name, grasp, parts, semi_axes, rejections))
             subjects.append(subject_of(parts, size, clash))
         self.direction = direction_to(subjects, result.problem.object_joint_model)
+        if len(sides) == 1 if arm is None else arm:
+            sides[0][2].extend(levelled(grasps[0][1], arm_parts(shapes, grasps[0][1])))
         right = Camera(np.zeros(3), self.direction, 1.0).axes[0]
         #: The best first.
         self.exhibits = tuple(
@@ -251,6 +258,11 @@ def obstacle_parts(shapes: BodyShapes, T_palm_object: Array, without: Collection
     ]
 
 
+def arm_parts(shapes: BodyShapes, grasp: Grasp) -> list[Part]:
+    """The arm that brings the hand to a grasp, in the palm's frame; nothing where there is none, or none is found."""
+    return [Part("arm", mesh, T, colour) for mesh, T, colour in shapes.arm(grasp)]
+
+
 def _clash_parts(shapes: BodyShapes, grasp: Grasp, size: float, clash: Clash) -> list[Part]:
     """Shapes that collide, in stripes, and the point where they do most."""
     hand, placements = grasp.problem.hand, grasp.problem.hand.link_placements(grasp.q)
@@ -312,8 +324,13 @@ def upright_parts(
 ) -> tuple[list[Part], Array]:
     """The parts and semi-axes of :func:`grasp_parts`, with the plane level on which the object stands."""
     parts, semi_axes = grasp_parts(shapes, grasp, size, clash)
+    return levelled(grasp, parts), semi_axes
+
+
+def levelled(grasp: Grasp, parts: list[Part]) -> list[Part]:
+    """Parts in the palm's frame, turned until the plane is level on which the object stands."""
     T = _upright(grasp)
-    return [Part(p.group, p.mesh, T @ p.T, p.colour) for p in parts], semi_axes
+    return [Part(p.group, p.mesh, T @ p.T, p.colour) for p in parts]
 
 
 def up_of_object(problem: Problem) -> Array | None:

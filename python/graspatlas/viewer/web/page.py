@@ -122,7 +122,7 @@ def commands(scene: Scene, *, with_legend: bool = False) -> Iterator[Command]:
     centred[:3, 3] = -camera.target
     yield {"type": "set_transform", "path": ROOT, "matrix": centred.T.ravel().tolist()}
     for exhibit in scene.exhibits:
-        for name in ("hand", "object", "obstacle", "contact", "normal", "ellipsoid", "clash"):
+        for name in ("hand", "object", "obstacle", "arm", "contact", "normal", "ellipsoid", "clash"):
             parts = [part for part in exhibit.parts if part.group == name]
             members = [mesh(part.mesh, part.T, part.colour) for part in parts]
             if name in SHOW_THROUGH:
