@@ -102,8 +102,10 @@ class Closing:
         """How fast the joints of a finger turn or slide where it closes, 1 for each that is driven, by name.
 
         Args:
-            number: The last joint of the finger.
+            number: The last joint of the finger; nothing turns or slides where it is fixed to the palm.
         """
+        if not self.chain(number):
+            return {}
         rates = self._one_way(number)
         open_end, closed_end = (self._end(number, rates, side) for side in (-1.0, 1.0))
         return rates if closed_end < open_end else {name: -rate for name, rate in rates.items()}

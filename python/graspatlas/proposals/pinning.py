@@ -1,7 +1,8 @@
 """Problems in which the object stays while the hand stays still.
 
 Between fingertips on two parallel faces an object can slide, and a ball can turn: such grasps are the same to the hand,
-but they use up the dimensions of an atlas. So patch parameters that let them happen are frozen where they are.
+but they use up the dimensions of an atlas. So patch parameters that let them happen are frozen where they are, and the
+place of the palm that touches.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ RANK = 1e-6
 
 
 def pinned(problem: Problem, x: Array) -> tuple[Problem, Array]:
-    """The problem with as few parameters of the object's patches frozen as keep the object still, and the grasp in it.
+    """The problem with those parameters of patches frozen that keep the object still, and the grasp in it.
+
+    They are all of the hand's, and as few of the object's as do.
 
     Args:
         problem: The problem, without first grasp.
@@ -34,23 +37,27 @@ def pinned(problem: Problem, x: Array) -> tuple[Problem, Array]:
     places = [
         (c, s, name) for c, contact in enumerate(problem.contacts) for s in (0, 1) for name in contact.sides[s].free
     ]
-    frozen: list[int] = []
+    before = hand + system.object_dof
+    frozen = [i for i, (_, side, _) in enumerate(places) if side == 0]
+    columns = [column for column in columns if column - before not in frozen]
     while True:
         moving = _still_hand_motions(J[:, columns])
-        of_object = [i for i, column in enumerate(columns) if column >= hand + system.object_dof]
-        of_object = [i for i in of_object if places[columns[i] - hand - system.object_dof][1] == 1]
+        of_object = [i for i, column in enumerate(columns) if column >= before]
         if not moving.shape[1] or not of_object:
             break
         weights = np.linalg.norm(moving, axis=1)
         i = max(of_object, key=lambda row: float(weights[row]))
         if weights[i] < RANK:
             break
-        frozen.append(columns.pop(i) - hand - system.object_dof)
+        frozen.append(columns.pop(i) - before)
     contacts = list(problem.contacts)
     for parameter in frozen:
-        c, _, name = places[parameter]
-        value = float(x[first + parameter])
-        contacts[c] = replace(contacts[c], frozen={**contacts[c].frozen, name: value})
+        c, side, name = places[parameter]
+        contact, value = contacts[c], {name: float(x[first + parameter])}
+        if side == 0:
+            contacts[c] = replace(contact, hand_frozen={**contact.hand_frozen, **value})
+        else:
+            contacts[c] = replace(contact, frozen={**contact.frozen, **value})
     return replace(problem, contacts=tuple(contacts)), np.delete(x, [first + parameter for parameter in frozen])
 
 

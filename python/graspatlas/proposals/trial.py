@@ -76,7 +76,7 @@ def problem_of(plan: Plan, assignment: Assignment) -> Problem:
     contacts = []
     for pad, region in zip(pads, regions, strict=True):
         patch = region.patch if region.filled >= WHOLE else region.inner
-        contacts.append(Contact(pad.frame, touched(pad), patch))
+        contacts.append(Contact(pad.frame, touched(assignment.fingers.hand, pad), patch))
     stated = tuple(each for each in plan.requirements if isinstance(each, StatedRequirement))
     return Problem(
         name=f"{plan.body.name} by {plan.hand}",

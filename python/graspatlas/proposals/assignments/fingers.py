@@ -15,6 +15,7 @@ from graspatlas.hand.hand import Hand
 from graspatlas.pads.closing import Closing
 from graspatlas.pads.find import find_pads
 from graspatlas.pads.pad import Pad
+from graspatlas.patches.base import Patch
 from graspatlas.patches.flat import Plane, Point
 from graspatlas.problem.assembly import grasp_system
 from graspatlas.problem.contacts import Contact
@@ -63,7 +64,7 @@ class Fingers:
     def system(self) -> _core.GraspSystem:
         """Contacts of the pads with nothing in particular: what computes where they are."""
         floor = Plane(origin=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
-        contacts = [Contact(pad.frame, touched(pad), floor) for pad in self.grip.pads]
+        contacts = [Contact(pad.frame, touched(self.hand, pad), floor) for pad in self.grip.pads]
         return grasp_system(self.hand, contacts, object_joint("free_flyer"), self.hand.mechanism.transmission, 0.01)
 
     def postures(self, count: int, rng: np.random.Generator) -> Array:
@@ -86,9 +87,10 @@ class Fingers:
         return arrays["hand_points"], arrays["hand_normals"]
 
 
-def touched(pad: Pad) -> Point:
-    """The middle of a pad, where it touches."""
-    return Point(position=pad.position, normal=pad.normal)
+def touched(hand: Hand, pad: Pad) -> Patch:
+    """What of a pad touches: the middle, which a finger moves to where it is needed; but anywhere on a palm."""
+    of_palm = hand.frame(pad.frame)[0] == 0
+    return pad.patch if of_palm else Point(position=pad.position, normal=pad.normal)
 
 
 def grips(hand: Hand, count: int | None = None, links: Sequence[str] | None = None) -> list[Fingers]:
