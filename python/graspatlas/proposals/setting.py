@@ -97,6 +97,7 @@ def made_ready(
     fixed, report = repaired(mesh, scale=1.0 if scale is None else scale)
     if scale is None and report.unit_doubt():
         raise GraspAtlasError(report.unit_doubt())
+    notes.append(f"the mesh: {report}")
     regions = find_regions(fixed, scale=1.0)
     body, note = write_object(fixed, mesh.stem, folder)
     notes.append(note)
