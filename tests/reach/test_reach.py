@@ -233,6 +233,8 @@ def test_what_is_far_away_is_refused(can_on_ur5: ga.Problem) -> None:
     assert can_on_ur5.arm is not None
     near = ga.Grasps(can_on_ur5, can_on_ur5.x1_array)
     assert near.reach().found.all()
+    none = ga.Grasps(can_on_ur5, near.x[:0]).reach()
+    assert (none.q.shape, none.found.shape, none.positions["elbow_joint"].shape) == ((0, 6), (0,), (0,))
     for distance in (1.2, 3.0, 1e6):  # a little too far, and far beyond
         away = replace(can_on_ur5, arm=replace(can_on_ur5.arm, object=ga.Pose([distance, 0, 0.5])))
         grasps = ga.Grasps(away, away.x1_array)
