@@ -60,6 +60,7 @@ if typing.TYPE_CHECKING:
     from graspatlas.proposals.outcome import Proposal, Proposals, ProposalsEnd
     from graspatlas.proposals.propose import propose
     from graspatlas.quality.batched import batched
+    from graspatlas.reach.reach import Reach, ReachStatus
     from graspatlas.regions.find import find_regions
     from graspatlas.regions.region import Region
     from graspatlas.requirements.collision_free import CollisionFree
@@ -129,6 +130,8 @@ __all__ = [
     "Proposal",
     "Proposals",
     "ProposalsEnd",
+    "Reach",
+    "ReachStatus",
     "Reachable",
     "Recording",
     "Refinement",
@@ -231,6 +234,7 @@ _HOMES: dict[str, tuple[str, ...]] = {
     "quality.batched": ("batched",),
     "regions.find": ("find_regions",),
     "regions.region": ("Region",),
+    "reach.reach": ("Reach", "ReachStatus"),
     "requirements.collision_free": ("CollisionFree",),
     "requirements.force_closure": ("ForceClosure",),
     "requirements.holding_force": ("HoldingForce",),

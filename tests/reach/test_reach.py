@@ -20,7 +20,7 @@ import graspatlas as ga
 from graspatlas.hand.hand import Hand
 from graspatlas.hand.named_hands import named_hand
 from graspatlas.hand.robot_files import find_file
-from graspatlas.reach.reach import ArmReach, ReachStatus
+from graspatlas.reach.reach import ArmReach, arm_reach
 from graspatlas.support.arrays import Array
 
 TURNING = ["revolute"] * 5
@@ -105,7 +105,7 @@ def test_where_random_postures_are_can_be_reached(can: ga.Problem, name: str) ->
     T = flange_placements(arm, Q)
     reach = ArmReach(replace(can, arm=arm))
     found = reach.look(np.tile(can.x1_array[:13], (len(Q), 1)), object_for(arm, T))
-    in_place = np.array([status is not ReachStatus.NO_POSTURE for status in found.statuses])
+    in_place = np.array([status is not ga.ReachStatus.NO_POSTURE for status in found.statuses])
     assert in_place.mean() >= 0.99
     assert found.found.sum() > 50
     moved = flange_placements(arm, found.q[found.found])
@@ -233,10 +233,12 @@ def test_what_is_far_away_is_refused(can_on_ur5: ga.Problem) -> None:
     assert can_on_ur5.arm is not None
     near = ga.Grasps(can_on_ur5, can_on_ur5.x1_array)
     assert near.reach().found.all()
+    none = ga.Grasps(can_on_ur5, near.x[:0]).reach()
+    assert (none.q.shape, none.found.shape, none.positions["elbow_joint"].shape) == ((0, 6), (0,), (0,))
     for distance in (1.2, 3.0, 1e6):  # a little too far, and far beyond
         away = replace(can_on_ur5, arm=replace(can_on_ur5.arm, object=ga.Pose([distance, 0, 0.5])))
         grasps = ga.Grasps(away, away.x1_array)
-        assert grasps.reach().statuses == (ReachStatus.NO_POSTURE,)
+        assert grasps.reach().statuses == (ga.ReachStatus.NO_POSTURE,)
         assert np.isnan(list(grasps.arm_positions().values())).all()
         with pytest.raises(
             ga.GraspAtlasError, match=r"no posture was found within the joint limits, which is no proof"
@@ -247,7 +249,7 @@ def test_what_is_far_away_is_refused(can_on_ur5: ga.Problem) -> None:
 def test_who_is_in_the_way_is_said(can_on_ur5: ga.Problem) -> None:
     wall = ga.Obstacle.sphere("balloon", 0.6)
     grasps = ga.Grasps(replace(can_on_ur5, obstacles=(wall,)), can_on_ur5.x1_array)
-    assert grasps.reach().statuses == (ReachStatus.HITS,)
+    assert grasps.reach().statuses == (ga.ReachStatus.HITS,)
     with pytest.raises(ga.GraspAtlasError, match=r"something is hit, in the first arm/\w+ and obstacle/balloon; take"):
         grasps[0].arm_positions()
 
@@ -258,15 +260,28 @@ def test_a_problem_without_an_arm(can: ga.Problem) -> None:
 
 
 def test_ctrl_c_ends_it(can_on_ur5: ga.Problem, can_result: ga.Result) -> None:
-    grasps = ga.Grasps(can_on_ur5, np.repeat(can_result.atlas.centers, 40, axis=0))
-    grasps.T_palm_object  # noqa: B018  (computed before)
-    ga.Grasps(can_on_ur5, can_on_ur5.x1_array).reach()  # shapes are read before
+    reach, grasps = arm_reach(can_on_ur5), ga.Grasps(can_on_ur5, can_result.atlas.centers[:200])
+    many = np.repeat(reach.flange_targets(grasps.T_palm_object), 2000, axis=0), np.repeat(grasps.q, 2000, axis=0)
     before, start = signal.signal(signal.SIGALRM, signal.default_int_handler), time.perf_counter()
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.2)
         with pytest.raises(KeyboardInterrupt):
-            grasps.reach()
+            reach._batch.solve(*many)  # all of them take a quarter of a minute
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
-    assert time.perf_counter() - start < 3.0
+    assert time.perf_counter() - start < 5.0
+
+
+@pytest.mark.parametrize(
+    ("targets", "hand", "message"),
+    [
+        (np.eye(4), np.zeros((1, 13)), r"poses must have the shape \[n, 4, 4\]"),
+        (np.full((1, 4, 4), np.nan), np.zeros((1, 13)), "poses must hold finite numbers; see pose 0"),
+        (np.eye(4)[None], np.zeros((1, 12)), r"hand must have the shape \[targets, 13\]"),
+        (np.eye(4)[None], np.full((1, 13), np.inf), "hand must hold finite numbers"),
+    ],
+)
+def test_the_core_refuses_what_does_not_fit(can_on_ur5: ga.Problem, targets: Array, hand: Array, message: str) -> None:
+    with pytest.raises(ga.GraspAtlasError, match=message):
+        arm_reach(can_on_ur5)._batch.solve(targets, hand)

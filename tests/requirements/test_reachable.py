@@ -50,11 +50,16 @@ def test_the_share_is_told(reached: ga.Result) -> None:
         "name": "ur5_robot",
         "reachable": reached.accepted.sum(),
         "of": reached.accepted.sum() + reached.rejected["reachable:0"],
+        "best": reached.refined_best.arm_positions(),
     }
     (line,) = [line for line in result_lines(reached, None) if line.startswith("  arm ur5_robot")]
     assert f"found for {arm['reachable']} of the {arm['of']} grasps that meet the other requirements" in line
+    for joint, position in reached.refined_best.arm_positions().items():
+        assert f"    {joint:20} {position:9.4f}" in result_lines(reached, None)
     assert "that none was found is no proof that there is none" in line
     assert "arm" not in replace(reached, requirements=(), rejected={}).summary()
+    none = replace(reached, accepted=np.zeros_like(reached.accepted), refinement=None)
+    assert none.summary()["arm"] == {**arm, "reachable": 0, "of": reached.rejected["reachable:0"], "best": None}
 
 
 def test_it_is_checked_last() -> None:

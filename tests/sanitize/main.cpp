@@ -14,6 +14,7 @@ int main() {
       {"pictures", strain::pictures},
 #ifdef GRASPATLAS_WITH_GRASPS
       {"grasps", strain::grasps},       {"collisions", strain::collisions}, {"climbs", strain::climbs},
+      {"arms", strain::arms},
 #endif
   };
   for (const auto& [name, run] : parts) {

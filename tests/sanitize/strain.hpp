@@ -62,6 +62,7 @@ class Random {
   std::mt19937 engine_;
 };
 
+void arms();
 void atlases();
 void climbs();
 void collisions();

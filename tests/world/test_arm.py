@@ -54,6 +54,8 @@ def test_joints_that_move_no_flange_are_locked() -> None:
     d = pin.buildModelFromXML(elsewhere.robot.urdf).frames[-1]
     assert d.name == "d"
     assert np.linalg.norm(pin.log3(d.placement.rotation)) == pytest.approx(0.5)
+    bent = fork.urdf.replace('lower="-1"', 'lower="0.2"')
+    assert ga.Arm(ga.Hand("made", bent), "c").robot.joints == ("ab", "bc")
     assert repr(arm) == "<Arm 'made': 2 joints, flange 'c'>"
 
 
@@ -83,7 +85,13 @@ WRONG: list[tuple[Any, str]] = [
         lambda: ga.Arm(
             made(joint("ab", "a", "b", "revolute"), joint("bc", "b", "c", "revolute", MIMIC), links="abc"), "c"
         ),
-        "joint 'bc' of arm 'made' moves the flange and mimics another, which is not supported: lock both",
+        "joint 'bc' of arm 'made' moves the flange and mimics another; that is not supported: lock both",
+    ),
+    (
+        lambda: ga.Arm(
+            made(joint("ab", "a", "b", "revolute"), joint("ac", "a", "c", "revolute", MIMIC), links="abc"), "b"
+        ),
+        "joint 'ac' of arm 'made' mimics 'ab', which moves the flange; that is not supported: make it fixed",
     ),
     (lambda: ga.Arm.from_dict({"urdf": "ur5.urdf"}), "an arm has no 'flange'"),
     (

@@ -62,7 +62,7 @@ class InverseKinematics {
   int joint_;
   Placement frame_;
   std::vector<Axis> axes_;
-  Eigen::Vector3d shoulder_;  ///< the origin of the first joint, which stays where it is
+  Eigen::Vector3d shoulder_;  ///< the origin of the first joint at rest
   double longest_, length_;
   Eigen::Matrix<double, 6, Eigen::Dynamic> columns_;
 };

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import combinations
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
@@ -116,10 +117,9 @@ class ArmScene:
         Raises:
             GraspAtlasError: If arm, hand, object or an obstacle has no collision shape, or one cannot be read.
         """
-        robot, _ = with_touching_links_allowed(both.arm.robot)
-        of_robot, of_hand = body_shapes(robot, robot.tree), body_shapes(problem.hand, problem.hand.tree)
-        may = may_touch(of_robot, robot)
-        arm = list(both.carried(of_robot, robot, ARM))
+        of_robot, may = _shapes_of_robot(_Same(both.arm.robot))
+        of_hand = body_shapes(problem.hand, problem.hand.tree)
+        arm = list(both.carried(of_robot, both.arm.robot, ARM))
         around = [*_surroundings(problem, both), *both.carried(of_hand, problem.hand, HAND)]
         # What is in the way of most postures first, and the arm's own links, which take longest, last.
         pairs = []
@@ -130,6 +130,27 @@ class ArmScene:
         shapes = (*arm, *around)
         names = tuple((shapes[a].name, shapes[b].name) for a, b in pairs)
         return cls(shapes, np.array(pairs, np.int32).reshape(-1, 2), names)
+
+
+class _Same:
+    """A robot as a key: the same object, which arms that stand elsewhere share."""
+
+    def __init__(self, robot: Hand) -> None:
+        self.robot = robot
+
+    def __hash__(self) -> int:
+        return id(self.robot)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and other.robot is self.robot
+
+
+@lru_cache(maxsize=4)
+def _shapes_of_robot(same: _Same) -> tuple[tuple[Shape, ...], frozenset[tuple[int, int]]]:
+    """Shapes of a robot and pairs of their numbers that may touch, of the last ones kept: what takes longest."""
+    robot, _ = with_touching_links_allowed(same.robot)
+    shapes = body_shapes(robot, robot.tree)
+    return shapes, may_touch(shapes, robot)
 
 
 def _surroundings(problem: Problem, both: CarriedHand) -> Iterator[Shape]:

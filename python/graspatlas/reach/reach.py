@@ -135,7 +135,7 @@ class ArmReach:
         targets = self.flange_targets(T_palm_object)
         found = []
         with progress_bar("arm", "grasps", len(hand)) as bar:
-            for start in range(0, len(hand), BATCH):
+            for start in range(0, max(len(hand), 1), BATCH):
                 found.append(self._batch.solve(targets[start : start + BATCH], hand[start : start + BATCH]))
                 bar.update(len(found[-1]["statuses"]))
         names = self.scene.names

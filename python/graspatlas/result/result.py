@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from graspatlas.atlas.verification import CheckReport
+from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.columns import grasp_columns, parameter_columns
 from graspatlas.grasps.grasp import Grasp
 from graspatlas.grasps.grasps import Grasps
@@ -20,6 +22,7 @@ from graspatlas.result.exports import Choice, save_grasps
 from graspatlas.result.files import read_result, save_result
 from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.result.summary import (
+    ArmSummary,
     GapSummary,
     GraspSummary,
     NearestSummary,
@@ -147,14 +150,9 @@ class Result(GraspAtlas):
             summary["nearest"] = self._summary_of_nearest()
         if self.others:
             summary["others"] = self._summary_of_others(best)
-        arm, asked = self.problem.arm, [str(r) for r in self.requirements if isinstance(r, Reachable)]
-        if arm is not None and asked:
-            reachable = int(self.accepted.sum())
-            summary["arm"] = {
-                "name": arm.name,
-                "reachable": reachable,
-                "of": reachable + sum(self.rejected[name] for name in asked),
-            }
+        for required in self.requirements:
+            if isinstance(required, Reachable) and self.problem.arm is not None:
+                summary["arm"] = self._summary_of_arm(required, self.problem.arm.name)
         if self.refinement:
             summary["refined"] = self._summary_of_refinement()
         return summary
@@ -180,6 +178,16 @@ class Result(GraspAtlas):
                 for rejection in self.rejections(chart)
             ],
         }
+
+    def _summary_of_arm(self, required: Reachable, name: str) -> ArmSummary:
+        """What the arm can bring about, and its posture at the best grasp."""
+        reachable, posture = int(self.accepted.sum()), None
+        if self.refinement or reachable:
+            best = self.refined_best if self.refinement else self.best
+            with suppress(GraspAtlasError):  # a stored result may be read where the meshes are not
+                posture = best.arm_positions(required.clearance)
+        of = reachable + self.rejected.get(str(required), 0)
+        return {"name": name, "reachable": reachable, "of": of, "best": posture}
 
     def _summary_of_gap(self) -> GapSummary | None:
         """The gap; None where there is no best to compare with."""

@@ -84,11 +84,16 @@ class NearestSummary(TypedDict):
 
 
 class ArmSummary(TypedDict):
-    """For how many charts a posture of the arm was found, of those that meet the other requirements."""
+    """For how many charts a posture of the arm was found, of those that meet the other requirements.
+
+    And its posture at the best grasp, the refined one where there is one; None where there is no best, or the
+    arm's meshes are not there.
+    """
 
     name: str
     reachable: int
     of: int
+    best: dict[str, float] | None
 
 
 class OtherSummary(TypedDict):

@@ -31,8 +31,8 @@ class Arm(Light):
     """A robot arm that carries the hand, and where it stands.
 
     The world's frame is anywhere: where only the base is placed, it is the object's frame. Joints of the robot that do
-    not move the flange, such as those of wheels or of a second arm, are locked at 0; ``robot.with_joints`` locks them
-    elsewhere.
+    not move the flange, such as those of wheels or of a second arm, are locked at 0, or as near to it as their limits
+    are; ``robot.with_joints`` locks them elsewhere.
 
     Attributes:
         robot: The arm with its joints and limits; the root of its URDF is the base. Like a hand it is read from a file,
@@ -60,7 +60,7 @@ class Arm(Light):
         if not isinstance(self.flange, str) or self.flange not in self.robot.frames:
             raise unknown_name("flange", self.flange, self.robot.frames, f"a link of arm '{self.name}'")
         self._check_joints()
-        object.__setattr__(self, "robot", self.robot.with_joints(self.joints))
+        object.__setattr__(self, "robot", self._without_others())
 
     def __repr__(self) -> str:
         return f"<Arm {self.name!r}: {len(self.joints)} joints, flange {self.flange!r}>"
@@ -133,6 +133,18 @@ class Arm(Light):
         flange = str(table.pop("flange"))
         return cls(Hand.from_dict(table, folder), flange, **poses)
 
+    def _without_others(self) -> Hand:
+        """The robot with the joints locked that do not move the flange."""
+        limits = self.robot.limits_by_name
+        others = [name for name in self.robot.mechanism.actuated if name not in self.joints]
+        locked = self.robot.with_joints(locked={name: float(np.clip(0.0, *limits[name])) for name in others})
+        for mimic in locked.mechanism.mimics:
+            raise GraspAtlasError(
+                f"joint '{mimic.joint}' of arm '{self.name}' mimics '{mimic.driver}', which moves the flange; that is "
+                "not supported: make it fixed in the URDF"
+            )
+        return locked
+
     def _check_joints(self) -> None:
         """Raise GraspAtlasError unless inverse kinematics can move the joints on the way to the flange."""
         if not self.joints:
@@ -146,6 +158,6 @@ class Arm(Light):
             if infos[name].v_size != 1:
                 raise GraspAtlasError(f"{what} has {infos[name].v_size} degrees of freedom, but each must have one")
             if name in self.robot.mechanism.followers:
-                raise GraspAtlasError(f"{what} moves the flange and mimics another, which is not supported: lock both")
+                raise GraspAtlasError(f"{what} moves the flange and mimics another; that is not supported: lock both")
             if infos[name].prismatic and not np.isfinite(limits[name]).all():
                 raise GraspAtlasError(f"{what} slides without limits: state some under limits")

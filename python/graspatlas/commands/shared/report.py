@@ -54,7 +54,7 @@ def result_lines(result: Result, folder: Path | None) -> list[str]:
         counts = ", ".join(f"{name} rejected {count}" for name, count in result.rejected.items())
         lines.append(f"  {result.accepted.sum()} grasps meet the requirements; checked in this order, {counts}")
     if "arm" in summary:
-        lines.append(_arm_line(summary["arm"]))
+        lines += _arm_lines(summary["arm"])
     if result.accepted.any():
         lines += _best_lines(result)
     elif result.refinement:
@@ -94,13 +94,17 @@ def _gap_line(gap: GapSummary, n_charts: int) -> str:
     return line
 
 
-def _arm_line(arm: ArmSummary) -> str:
-    """What the arm can bring about."""
+def _arm_lines(arm: ArmSummary) -> list[str]:
+    """What the arm can bring about, and how it stands at the best grasp."""
     share = f" ({arm['reachable'] / arm['of']:.1%})" if arm["of"] else ""
-    return (
+    lines = [
         f"  arm {arm['name']}: a posture was found for {arm['reachable']} of the {arm['of']} grasps that meet the "
         f"other requirements{share}; that none was found is no proof that there is none"
-    )
+    ]
+    if arm["best"]:
+        lines.append("    its joints at the best grasp below [rad or m]:")
+        lines += [f"    {joint:20} {value:9.4f}" for joint, value in arm["best"].items()]
+    return lines
 
 
 def _best_lines(result: Result) -> list[str]:
