@@ -47,7 +47,16 @@ FLOORS = (
         "simulation",
         "formats",
     ),
-    *("viewer.scene", "viewer.films", "viewer.render", "viewer.web", "viewer.explorer", "viewer.figures", "viewer"),
+    *(
+        "viewer.scene",
+        "viewer.films",
+        "viewer.render",
+        "viewer.web",
+        "viewer.explorer",
+        "viewer.figures",
+        "viewer.notebook",
+        "viewer",
+    ),
     *("reproduce", "sweep", "proposals", "commands", "cli", "__main__"),
 )
 #: Packages whose ``__init__`` is no face but defines what it offers.

@@ -6,9 +6,10 @@ import csv
 import importlib
 import pkgutil
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ import graspatlas as ga
 from graspatlas.atlas.status import Closed
 from graspatlas.commands.diagnosis import NOTE, OK, PROBLEM
 from graspatlas.formats.export import FORMATS
+from graspatlas.problem_files import json_schema
 from graspatlas.proposals.outcome import COLUMNS as PROPOSALS
 from graspatlas.quality import INDICES
 from graspatlas.reproduce.tables import COLUMNS as NUMBERS
@@ -61,9 +63,19 @@ def words() -> set[str]:
 
 
 def names() -> set[str]:
-    """Names of requirements, indices, protocols, formats and reasons, and the marks of ``check``."""
+    """Names of requirements, indices, protocols, formats, patches and reasons, and the marks of ``check``."""
     closed = {reason.name.lower() for reason in Closed if reason is not Closed.OPEN}
-    return {*closed, *REQUIREMENTS, *INDICES, *PROTOCOLS, *FORMATS, OK, NOTE, PROBLEM}
+    stated = set(constants(json_schema()))
+    assert {"planar", "cylinder"} <= stated
+    return {*closed, *stated, *REQUIREMENTS, *INDICES, *PROTOCOLS, *FORMATS, OK, NOTE, PROBLEM}
+
+
+def constants(schema: Any) -> Iterator[str]:
+    """The words that a field of a schema may be."""
+    if isinstance(schema, dict):
+        yield from (word for word in (schema.get("const"), *schema.get("enum", ())) if isinstance(word, str))
+    for part in schema.values() if isinstance(schema, dict) else schema if isinstance(schema, list) else ():
+        yield from constants(part)
 
 
 def columns(result: ga.Result, folder: Path) -> set[str]:

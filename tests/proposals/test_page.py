@@ -50,3 +50,10 @@ def test_markup_in_names_is_text(tab: Tab, proposed: ga.Proposals, output: Path)
     assert tab.run("document.title") == HOSTILE
     assert tab.run("document.scripts.length") == 0
     assert tab.run("document.querySelector('tbody td').textContent").count(HOSTILE) == 3
+
+
+def test_proposals_have_a_card_in_notebooks(proposed: ga.Proposals) -> None:
+    html = proposed._repr_html_()
+    assert html.count("<img") == 1
+    assert all(each.tried.name in html for each in proposed.proposals)
+    assert "why others were refused" in html

@@ -16,6 +16,7 @@ from graspatlas.atlas.topology import euler_characteristic, facet_ring
 from graspatlas.errors import GraspAtlasError
 from graspatlas.storage.columns import joined, to_frame
 from graspatlas.support.arrays import AnyArray, Array, BoolArray, Int32Array, IntArray
+from graspatlas.support.notebooks import Displayed
 from graspatlas.support.pickling import Light
 from graspatlas.support.validation import number_array, read_only
 from graspatlas.systems.projection import checked_point
@@ -45,7 +46,7 @@ _GRAIN = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class Atlas(Light):
+class Atlas(Light, Displayed):
     """Charts that cover the part of a manifold connected to a first point.
 
     Chart i covers the points above the polytope ``{u : facet_normals u <= facet_offsets}`` of its tangent space; facets

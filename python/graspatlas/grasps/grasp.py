@@ -21,6 +21,7 @@ from graspatlas.execution.squeeze import Stiffness, squeeze
 from graspatlas.grasps.poses import inverse, poses_by_name, quaternions, se3
 from graspatlas.reach.reach import ReachStatus, arm_reach
 from graspatlas.support.arrays import Array
+from graspatlas.support.notebooks import Displayed
 
 if TYPE_CHECKING:
     import pinocchio as pin
@@ -31,7 +32,7 @@ __all__ = ["Grasp"]
 
 
 @dataclass(frozen=True, eq=False)
-class Grasp:
+class Grasp(Displayed):
     """One grasp; m contacts, h joint velocities. Its arrays cannot be written to: copy what you want to change.
 
     Attributes:

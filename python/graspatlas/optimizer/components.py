@@ -28,6 +28,7 @@ from graspatlas.search.grasp_search import MAX_SINGULAR, GraspSearch
 from graspatlas.support.arrays import Array
 from graspatlas.support.deadlines import deadline_after, seconds_until
 from graspatlas.support.interrupts import stoppable
+from graspatlas.support.notebooks import Displayed
 from graspatlas.support.progress import progress_bar
 from graspatlas.support.validation import check_keywords, whole
 from graspatlas.support.words import Word
@@ -73,7 +74,7 @@ class ComponentsSummary(TypedDict):
 
 
 @dataclass(frozen=True, eq=False)
-class Components:
+class Components(Displayed):
     """The connected components of R that were found, the best first.
 
     Their qualities can be compared: torques are divided by one length, ``problem.torque_arm``, in all of them.

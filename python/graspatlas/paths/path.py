@@ -27,6 +27,7 @@ from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.storage.columns import joined, pose_columns
 from graspatlas.storage.files import write_csv
 from graspatlas.support.arrays import Array, BoolArray, IntArray
+from graspatlas.support.notebooks import Displayed
 from graspatlas.support.pickling import Light
 from graspatlas.support.renamed import renamed_attribute
 
@@ -34,7 +35,7 @@ __all__ = ["GraspPath", "Path"]
 
 
 @dataclass(frozen=True, eq=False)
-class Path(Light):
+class Path(Light, Displayed):
     """A path on a manifold, as points so close together that one may go from each to the next.
 
     Attributes:

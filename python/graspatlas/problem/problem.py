@@ -45,6 +45,7 @@ from graspatlas.problem.validation import (
     checked_posture,
 )
 from graspatlas.support.arrays import Array
+from graspatlas.support.notebooks import Displayed
 from graspatlas.support.pickling import Light
 from graspatlas.support.validation import PlainTable, StatedTable, checked_table, number, number_array, read_only, shown
 from graspatlas.world.arm import Arm
@@ -57,7 +58,7 @@ FROZEN_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Problem(Light):
+class Problem(Light, Displayed):
     """All that defines the set of relevant grasps, and defaults for its atlas.
 
     Joints that mimic others, by the ``<mimic>`` tags of the hand's URDF, follow their drivers on all feasible grasps F:

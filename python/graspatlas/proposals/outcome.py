@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from graspatlas.grasps.grasp import Grasp
 from graspatlas.proposals.assignments.matching import Counts
 from graspatlas.proposals.trial import LookEnd
 from graspatlas.quality.batched import Quality, quality_name
@@ -77,10 +78,14 @@ class Proposal:
     folder: Path
 
     @property
+    def grasp(self) -> Grasp:
+        """The best grasp, refined where it was."""
+        return self.result.refined_best if self.result.refinement else self.result.best
+
+    @property
     def quality(self) -> float:
         """The index of the best grasp."""
-        refined = self.result.refined_best if self.result.refinement else None
-        return float((refined or self.result.best).quality)
+        return float(self.grasp.quality)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +112,21 @@ class Proposals:
 
     def __repr__(self) -> str:
         return f"<Proposals: {self.summary()}>"
+
+    def _repr_html_(self) -> str:
+        from graspatlas.viewer.notebook.card import card, folded, table
+        from graspatlas.viewer.notebook.pictures import picture_of_grasp
+
+        rows = [
+            (each.quality, each.tried.name, each.result.atlas.n_charts, int(each.result.accepted.sum()), each.folder)
+            for each in self.proposals
+        ]
+        content = [table(rows, (quality_name(self.quality), "assignment", "charts", "accepted", "folder"))]
+        if refusals := self.refusals():
+            content.append(folded("why others were refused", table(refusals)))
+        content.append(table([[note] for note in self.notes]) if self.notes else "")
+        beside = picture_of_grasp(self.proposals[0].grasp) if self.proposals else ""
+        return card(f"Proposals: {self.summary()}", content, beside)
 
     def summary(self) -> str:
         """How many there are of how many that were looked at, the best, what refused the others, and why it ended."""

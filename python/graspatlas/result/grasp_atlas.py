@@ -26,6 +26,7 @@ from graspatlas.requirements.screening import screen
 from graspatlas.result.gap import Gap, estimate_gap
 from graspatlas.result.refinement import Refinement
 from graspatlas.support.arrays import Array, BoolArray, IndexArray
+from graspatlas.support.notebooks import Displayed
 from graspatlas.support.pickling import Light
 from graspatlas.support.renamed import renamed_attribute
 from graspatlas.support.validation import read_only, shown
@@ -56,7 +57,7 @@ def check_is_result(value: object) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class GraspAtlas(Light):
+class GraspAtlas(Light, Displayed):
     """The best grasp, and everything it was chosen from; :class:`graspatlas.Result` adds what is made of it.
 
     Its arrays cannot be written to: copy what you want to change.

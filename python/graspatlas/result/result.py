@@ -33,6 +33,7 @@ from graspatlas.result.summary import (
 )
 from graspatlas.result.verification import check_result
 from graspatlas.storage.columns import joined, to_frame
+from graspatlas.support.notebooks import EmbeddedPage, explorer_of
 from graspatlas.support.renamed import renamed_keyword
 
 if TYPE_CHECKING:
@@ -109,6 +110,20 @@ class Result(GraspAtlas):
                 self.atlas.chart_columns(volumes),
             )
         )
+
+    def explore(self, chart: int | None = None, *, height: int = 640) -> EmbeddedPage:
+        """The page of the whole atlas, with the hand beside it, in a notebook: as the output of a cell that ends in it.
+
+        It is the page that :func:`graspatlas.export_html` writes, within Jupyter, VS Code or Colab.
+
+        Args:
+            chart: The chart at which it opens; by default the best grasp, the worst beside it.
+            height: Its height [pixels], 200 to 4000.
+
+        Raises:
+            GraspAtlasError: If a mesh cannot be read, or there is no such chart.
+        """
+        return explorer_of(self, chart, height)
 
     def check(self) -> CheckReport:
         """Verify every chart again, from the problem alone; see :func:`graspatlas.result.verification.check_result`."""

@@ -31,6 +31,8 @@ __all__ = ["Sweep", "run_sweep"]
 
 #: Rows reach the disk at least this often while runs finish [s].
 WRITE_SECONDS = 5.0
+#: Rows that a notebook shows.
+MOST_SHOWN = 20
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,19 @@ class Sweep:
     def failed(self) -> list[Row]:
         """Rows of the runs that failed."""
         return [row for row in self.rows if row["error"]]
+
+    def _repr_html_(self) -> str:
+        from graspatlas.viewer.notebook.card import bars, card, table
+
+        head = ("problem", "dimension", "radius", "quality", "status", "n_charts", "n_accepted", "quality_best")
+        told = [[row["error"] or row[name] if name == "status" else row[name] for name in head] for row in self.rows]
+        cells = [["" if value is None else value for value in row] for row in told[:MOST_SHOWN]]
+        left = f", the first {MOST_SHOWN} below" if len(told) > MOST_SHOWN else ""
+        ended = f"{len(self.rows)} runs ended, {len(self.failed)} of them failed, {self.missing} are missing{left}"
+        quality = next(iter(self.best()), "")
+        values = [row["quality_best"] for row in self.rows if row["quality"] == quality and row["quality_best"]]
+        beside = bars(values, f"best {quality} of each run") if values else ""
+        return card(f"Sweep: {ended}", [table(cells, head)], beside)
 
     def best(self) -> dict[str, Row]:
         """For each quality index, the row with the best grasp over all problems and options.

@@ -10,7 +10,7 @@ from PIL import Image
 
 from graspatlas import _core
 from graspatlas.errors import GraspAtlasError
-from graspatlas.support.arrays import Float32Array
+from graspatlas.support.arrays import Array, Float32Array
 from graspatlas.viewer.render.raster import Fragments, in_front_of, nearest
 from graspatlas.viewer.render.shading import FloorShadow, Shadow, crevices, lamps, to_linear
 from graspatlas.viewer.render.text_images import GREY, LINE, SMALL, caption_image, legend_image, text_image
@@ -100,13 +100,19 @@ def _write_legend(image: Image.Image, scene: Scene, size: float) -> None:
     image.paste(head, (int(0.8 * size), int(0.7 * size)), head)
 
 
+def _corners(parts: list[Part]) -> Array:
+    """Corners of the triangles of parts in the world [f, 3, 3], metres."""
+    placed = [part.mesh.moved(part.T) for part in parts]
+    return np.concatenate([np.zeros((0, 3, 3)), *(mesh.vertices[mesh.faces] for mesh in placed)])
+
+
 class _Triangles:
     """Triangles of several parts, placed in the world and on the screen."""
 
     def __init__(self, parts: list[Part], camera: Camera, width: int, height: int) -> None:
         placed = [part.mesh.moved(part.T) for part in parts]
         none = np.zeros((0, 3, 3))
-        self.points = np.concatenate([none, *(m.vertices[m.faces] for m in placed)])
+        self.points = _corners(parts)
         self.normals = np.concatenate([none, *(m.normals[m.faces] for m in placed)]).astype(np.float32)
         owner = np.repeat(np.arange(len(parts)), [len(m.faces) for m in placed])
         colours = np.array([part.colour for part in parts]).reshape(-1, 4)
@@ -127,9 +133,8 @@ class _Painter:
         self.solid = self._triangles([p for p in parts if p.colour[3] >= 1.0])
         self.clear = self._triangles([p for p in parts if p.colour[3] < 1.0])
         self.marks = self._triangles([replace(p, colour=(*p.colour[:3], SHOW_THROUGH[p.group])) for p in marks])
-        body = self._triangles(bodies).points
-        self.shadow = Shadow(self._triangles([p for p in bodies if p.colour[3] >= 1.0]).points, self.lamps[0])
-        self.floor = FloorShadow(body)
+        self.shadow = Shadow(_corners([p for p in bodies if p.colour[3] >= 1.0]), self.lamps[0])
+        self.floor = FloorShadow(_corners(bodies))
         self.nearness = np.zeros(width * height, np.float32)
 
     def _triangles(self, parts: list[Part]) -> _Triangles:

@@ -87,26 +87,30 @@ class Marked:
 
     def directions(self) -> tuple[Array, Array]:
         """Unit vectors (3,) towards two cameras: the one that sees most of the marks, and one that sees the others."""
-        views = [
-            np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)]) for e in ELEVATIONS for a in AZIMUTHS
-        ]
-        seen = np.array([[self._clear(mark, view) for mark in self.marks] for view in views])
+        views = np.array(
+            [[np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)] for e in ELEVATIONS for a in AZIMUTHS]
+        )
+        seen = np.array([self._clear(mark, views) for mark in self.marks]).reshape(-1, len(views)).T
         first = int(np.argmax(seen.sum(axis=1)))
         flat = np.array([view / np.linalg.norm(view[:2]) * [1.0, 1.0, 0.0] for view in views])
         away = flat @ flat[first] <= np.cos(TURNED)
         both = np.maximum(seen, seen[first]).sum(axis=1) + 0.25 * seen.sum(axis=1)
         return views[first], views[int(np.argmax(np.where(away, both, -np.inf)))]
 
-    def _clear(self, mark: Mark, view: Array) -> float:
-        """How well a mark is seen: its face and the length of its normal, and that nothing stands before it."""
-        facing = float(mark.normal @ view)
-        start = mark.point + 0.02 * self._size * mark.normal
-        gaps = self._cloud - start
-        along = gaps @ view
-        aside = np.linalg.norm(gaps - along[:, None] * view, axis=1)
-        hidden = bool(((along > 0.02 * self._size) & (aside < 0.012 * self._size)).any())
-        seen = max(facing, 0.0) + np.sqrt(max(1.0 - facing**2, 0.0)) if facing > TURNED_AWAY else 0.2
-        return float(seen) * (HIDDEN if hidden else 1.0)
+    def _clear(self, mark: Mark, views: Array) -> Array:
+        """How well a mark is seen in each view: its face and the length of its normal, and that nothing is before it.
+
+        Args:
+            mark: The mark.
+            views: Unit vectors towards cameras (v, 3).
+        """
+        facing = views @ mark.normal
+        gaps = self._cloud - (mark.point + 0.02 * self._size * mark.normal)
+        along = gaps @ views.T
+        aside_squared = (gaps**2).sum(axis=1)[:, None] - along**2
+        hidden = ((along > 0.02 * self._size) & (aside_squared < (0.012 * self._size) ** 2)).any(axis=0)
+        seen = np.maximum(facing, 0.0) + np.sqrt(np.maximum(1.0 - facing**2, 0.0))
+        return np.where(facing > TURNED_AWAY, seen, 0.2) * np.where(hidden, HIDDEN, 1.0)
 
     @cached_property
     def _cloud(self) -> Array:
@@ -133,11 +137,16 @@ def marked_hand(hand: Hand, pads: Sequence[Pad]) -> Marked:
     return Marked(f"{hand.name}: {len(pads)} pads", tuple(parts), tuple(marks), legend)
 
 
-def marked_problem(problem: Problem) -> Marked:
-    """A problem before it is solved: hand and object at x1, or at the reference and the pose guess."""
+def marked_problem(problem: Problem, shapes: BodyShapes | None = None) -> Marked:
+    """A problem before it is solved: hand and object at x1, or at the reference and the pose guess.
+
+    Args:
+        problem: The problem.
+        shapes: Its meshes, where they have been read.
+    """
     q, T_object, where = _setup(problem)
     placements = problem.hand.link_placements(q)
-    shapes = BodyShapes(problem)
+    shapes = shapes or BodyShapes(problem)
     parts = [Part("hand", mesh, T, _lighter(colour)) for mesh, T, colour in shapes.hand(q)]
     size = _size_of(parts)
     for mesh, T, colour in shapes.object():

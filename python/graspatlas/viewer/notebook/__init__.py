@@ -1,0 +1,1 @@
+"""What notebooks show: cards with a table and a picture."""
