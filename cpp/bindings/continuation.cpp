@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "bindings.hpp"
 #include "graspatlas/continuation/chart.hpp"
@@ -21,6 +22,20 @@ namespace py = pybind11;
 namespace graspatlas {
 
 namespace {
+
+py::array_t<double> differences(const System& system, const DoubleArray& X0, const DoubleArray& X1) {
+  const int size = system.configuration_size(), columns = system.tangent_size();
+  for (const auto& [X, name] : {std::pair(&X0, "X0"), std::pair(&X1, "X1")}) {
+    if (X->ndim() != 2 || X->shape(1) != size || X->shape(0) != X0.shape(0))
+      throw Error(std::string(name) + " must have " + std::to_string(size) + " columns, one row for each pair");
+  }
+  auto out = matrix<double>(X0.shape(0), columns);
+  double* to = out.mutable_data();
+  const double *from = X0.data(), *towards = X1.data();
+  for (py::ssize_t i = 0; i < X0.shape(0); ++i)
+    system.difference(from + i * size, towards + i * size, to + i * columns);
+  return out;
+}
 
 /// A system whose residual and Jacobian are methods of a Python object.
 class PythonSystem : public System, public py::trampoline_self_life_support {
@@ -194,6 +209,8 @@ void bind_systems(py::module_& module) {
             return vector(out);
           },
           py::arg("x0"), py::arg("x1"), "x1 (-) x0 [tangent_size].")
+      .def("differences", &differences, py::arg("X0"), py::arg("X1"),
+           "x1 (-) x0 of n pairs of points [n x tangent_size], each a row of X0 and X1 [n x configuration_size].")
       .def(
           "same_point",
           [](const System& s, const DoubleArray& x0, const DoubleArray& x1, double tolerance) {

@@ -96,6 +96,14 @@ class AnySystem:
         """
         x1 (-) x0 [tangent_size].
         """
+    def differences(
+        self,
+        X0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        X1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        x1 (-) x0 of n pairs of points [n x tangent_size], each a row of X0 and X1 [n x configuration_size].
+        """
     def embed(self, x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         Euclidean image of x, by which charts are looked up.

@@ -42,7 +42,7 @@ def test_a_picture_opens_its_grasps(tab: Tab, proposed: ga.Proposals, output: Pa
 
 
 def test_markup_in_names_is_text(tab: Tab, proposed: ga.Proposals, output: Path) -> None:
-    tried = tuple(replace(each, links=(HOSTILE,) * 3, why=HOSTILE) for each in proposed.tried)
+    tried = tuple(replace(each, links=(HOSTILE,) * 3, why=HOSTILE, lack=HOSTILE) for each in proposed.tried)
     proposals = tuple(replace(each, tried=tried[0]) for each in proposed.proposals)
     hostile = replace(proposed, proposals=proposals, tried=tried, notes=(HOSTILE,))
     write_page(hostile, HOSTILE, output / "hostile.html")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import shutil
 from collections.abc import Callable
 from importlib import import_module
@@ -133,6 +134,12 @@ def test_requirements_that_nothing_meets_are_named(can_file: Path, tmp_path: Pat
     assert found.refusals()
     assert all("holding_force" in reason or "no grasp was found" in reason for reason in found.refusals())
     assert all(each.end is not LookEnd.MET for each in found.tried)
+    missed = [each for each in found.tried if each.end is LookEnd.MISSED]
+    assert missed
+    for each in missed:
+        assert re.search(r"holding_force:1e\+09: withstands \S+ N, 1e\+09 N is required", each.lack)
+    page = (tmp_path / "proposals.html").read_text(encoding="utf-8")
+    assert page.count("nearest: holding_force") == len(missed)
 
 
 def test_an_atlas_that_cannot_grow_is_said(

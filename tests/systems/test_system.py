@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -232,6 +233,19 @@ def test_jacobian_of_planar_contacts(hand, body, kept):
 @pytest.mark.parametrize("system", KNOWN, ids=lambda system: type(system).__name__)
 def test_identities_of_the_systems_that_tests_are_made_of(system):
     check_system(system, system.x0 + 0.1 * np.random.default_rng(3).normal(size=(10, len(system.x0))))
+
+
+def test_differences_of_many_points_are_those_of_each(bottle, sphere):
+    for atlas in (ga.optimize(bottle, radius=0.3, require=[]).atlas, sphere):
+        x, system = atlas.centers, atlas.system
+        one_by_one = np.array([system.difference(a, b) for a, b in pairwise(x)])
+        np.testing.assert_array_equal(system.differences(x[:-1], x[1:]), one_by_one)
+        a, b = atlas.neighbour_pairs[-1]
+        assert atlas.neighbour_distances[-1] == np.linalg.norm(system.difference(x[a], x[b]))
+        assert len(atlas.neighbour_distances) == len(atlas.neighbour_pairs)
+        for wrong in ((x[:3], x[:2]), (x[:3, :-1], x[:3]), (x[0], x[0])):
+            with pytest.raises(ga.GraspAtlasError, match=r"X[01] must have \d+ columns, one row for each pair"):
+                system.differences(*wrong)
 
 
 def test_jacobian_error_finds_a_wrong_jacobian():

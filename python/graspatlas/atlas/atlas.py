@@ -43,6 +43,8 @@ SHORT_FACET = 0.05
 
 #: Vertices of a polytope nearer to each other than this share of the radius count as one for its volume.
 _GRAIN = 1e-7
+#: Pairs of charts of which distances are computed at a time.
+_PAIRS = 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,6 +267,14 @@ class Atlas(Light, Displayed):
         return [pairs[a:b, 1] for a, b in pairwise(ends)]
 
     @cached_property
+    def neighbour_distances(self) -> Array:
+        """Distances of the centres of neighbouring charts, in the order of `neighbour_pairs` [p], as `radius`."""
+        x = self.centers
+        parts = (self.neighbour_pairs[i : i + _PAIRS] for i in range(0, len(self.neighbour_pairs), _PAIRS))
+        steps = [np.linalg.norm(self.system.differences(x[pairs[:, 0]], x[pairs[:, 1]]), axis=1) for pairs in parts]
+        return read_only(np.concatenate(steps or [np.zeros(0)]))
+
+    @cached_property
     def _index(self) -> cKDTree:
         from scipy.spatial import cKDTree  # slow to import
 
@@ -369,9 +379,12 @@ class Atlas(Light, Displayed):
         Raises:
             GraspAtlasError: If pandas is not installed.
         """
-        pairs, x = self.neighbour_pairs, self.centers
-        distances = [float(np.linalg.norm(self.system.difference(x[a], x[b]))) for a, b in pairs]
-        columns = {"chart": pairs[:, 0], "neighbour": pairs[:, 1], "distance": np.array(distances)}
+        pairs = self.neighbour_pairs
+        columns: dict[str, AnyArray] = {
+            "chart": pairs[:, 0],
+            "neighbour": pairs[:, 1],
+            "distance": self.neighbour_distances,
+        }
         return to_frame(columns, index=None)
 
     def to_arrays(self) -> dict[str, AnyArray]:

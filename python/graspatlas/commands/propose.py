@@ -85,5 +85,7 @@ def _lines(found: Proposals) -> list[str]:
     elif not found.proposals:
         lines.append("no grasp was found that meets the requirements:")
         lines += [f"  {count:5} assignments: {reason}" for reason, count in found.refusals().items()]
+        missed = [each for each in found.tried if each.lack]
+        lines += [f"the most promising of these, {each.name}, came as near as {each.lack}" for each in missed[:1]]
         lines.append("try another --seed, more --max-seconds, other --fingers or --links, or softer requirements")
     return lines

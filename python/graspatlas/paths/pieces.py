@@ -13,7 +13,7 @@ from graspatlas.support.arrays import BoolArray, IntArray
 
 __all__ = ["Gap", "NotConnected", "Piece", "apart", "narrowest_gap"]
 
-#: Pairs of charts whose coordinates are nearest, of which the distance is measured.
+#: Pairs of charts whose Euclidean images are nearest, of which the distance is measured.
 MEASURED = 100
 
 
@@ -111,8 +111,9 @@ def narrowest_gap(atlas: Atlas, first: IntArray, second: IntArray) -> Gap:
     from scipy.sparse.csgraph import dijkstra
 
     pairs = atlas.neighbour_pairs.astype(np.int64)
-    lengths = [_distance(atlas, int(i), int(j)) for i, j in pairs]
-    graph = coo_array((lengths, (pairs[:, 0], pairs[:, 1])), shape=(atlas.n_charts, atlas.n_charts)).tocsr()
+    graph = coo_array(
+        (atlas.neighbour_distances, (pairs[:, 0], pairs[:, 1])), shape=(atlas.n_charts, atlas.n_charts)
+    ).tocsr()
     distances, before, _ = dijkstra(graph, directed=False, indices=first, return_predecessors=True, min_only=True)
     nearest = int(second[np.argmin(distances[second])])
     if not np.isfinite(distances[nearest]):
@@ -124,10 +125,11 @@ def narrowest_gap(atlas: Atlas, first: IntArray, second: IntArray) -> Gap:
 
 
 def _gap_in_space(atlas: Atlas, first: IntArray, second: IntArray) -> Gap:
-    """The nearest charts of two pieces, of those whose coordinates differ least."""
+    """The nearest charts of two pieces, of those whose Euclidean images are nearest."""
     from scipy.spatial import cKDTree  # slow to import
 
-    apart, nearest = cKDTree(atlas.centers[second]).query(atlas.centers[first])
+    images = [np.array([atlas.system.embed(x) for x in atlas.centers[piece]]) for piece in (first, second)]
+    apart, nearest = cKDTree(images[1]).query(images[0])
     order = np.argsort(apart, kind="stable")[:MEASURED]
     pairs = [(int(first[i]), int(second[nearest[i]])) for i in order]
     distance, pair = min((_distance(atlas, *pair), pair) for pair in pairs)

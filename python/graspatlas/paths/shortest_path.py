@@ -20,7 +20,7 @@ from graspatlas.grasps.grasp import Grasp
 from graspatlas.paths.path import GraspPath, Path
 from graspatlas.paths.pieces import NotConnected, Piece, apart
 from graspatlas.result.grasp_atlas import GraspAtlas
-from graspatlas.support.arrays import Array, BoolArray
+from graspatlas.support.arrays import Array, BoolArray, IntArray
 from graspatlas.support.interrupts import stoppable
 from graspatlas.support.renamed import renamed_keyword
 from graspatlas.support.validation import number_array, positive
@@ -231,7 +231,7 @@ class _ChartGraph:
         self, atlas: Atlas, open_charts: BoolArray, ends: list[_End], step: float, allowed: Allowed | None
     ) -> None:
         self.atlas, self.ends, self.step, self.allowed = atlas, ends, step, allowed
-        pairs = [atlas.neighbour_pairs.astype(np.int64)]
+        pairs, lengths = [atlas.neighbour_pairs.astype(np.int64)], [atlas.neighbour_distances]
         self.points = [*atlas.centers]
         self.nodes = []
         for end in ends:
@@ -239,12 +239,13 @@ class _ChartGraph:
             if not end.at_centre:
                 beside = np.append(atlas.neighbours[end.chart], end.chart)
                 pairs.append(np.column_stack([beside, np.full(len(beside), len(self.points))]))
+                to_end = [atlas.system.difference(self.points[i], end.x) for i in beside]
+                lengths.append(np.linalg.norm(np.reshape(to_end, (len(beside), -1)), axis=1))
                 self.points.append(end.x)
         self.open = np.append(open_charts, np.ones(len(self.points) - atlas.n_charts, bool))
         edges = np.concatenate(pairs)
-        self.pairs = edges[self.open[edges].all(axis=1)]
-        difference = atlas.system.difference
-        self.lengths = np.array([np.linalg.norm(difference(self.points[i], self.points[j])) for i, j in self.pairs])
+        passable = self.open[edges].all(axis=1)
+        self.pairs, self.lengths = edges[passable], np.concatenate(lengths)[passable]
         self.chains: dict[tuple[int, int], Array] = {}
         self.n_closed = 0
 
@@ -260,7 +261,8 @@ class _ChartGraph:
             if not closed:
                 break
             self.n_closed += len(closed)
-            keep = [(int(min(pair)), int(max(pair))) not in closed for pair in self.pairs]
+            numbers, parted = self._numbers(self.pairs), self._numbers(np.array(sorted(closed)))
+            keep = ~np.isin(numbers, parted)
             self.pairs, self.lengths = self.pairs[keep], self.lengths[keep]
         pieces = [self.chains[a, b] if a < b else self.chains[b, a][::-1] for a, b in pairwise(route)]
         return np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
@@ -276,6 +278,10 @@ class _ChartGraph:
             closed |= {leg for leg, a, b in zip(chains, starts[:-1], starts[1:], strict=True) if not free[a:b].all()}
         self.chains |= {leg: chain for leg, chain in chains.items() if leg not in closed}
         return closed
+
+    def _numbers(self, pairs: IntArray) -> IntArray:
+        """A number for each pair of nodes, whichever comes first (p,)."""
+        return np.asarray(pairs.min(axis=1) * len(self.points) + pairs.max(axis=1), np.int64)
 
     def _route(self) -> list[int]:
         """Nodes of the shortest way through the graph."""

@@ -19,7 +19,7 @@ __all__ = ["KeptLooks"]
 
 #: Changes when a look of an older version would not be the same.
 VERSION = 2
-_KINDS = {"end": "U", "why": "U", "value": "f", "x": "f", "postures": "f"}
+_KINDS = {"end": "U", "why": "U", "lack": "U", "value": "f", "x": "f", "postures": "f"}
 
 
 class KeptLooks:
@@ -63,7 +63,8 @@ class KeptLooks:
         part = read_run_file(path, self._digest)
         if set(part) != set(_KINDS) or any(array.dtype.kind != _KINDS[name] for name, array in part.items()):
             raise damaged(path)
-        return Look(LookEnd(str(part["end"])), float(part["value"]), part["x"], part["postures"], str(part["why"]))
+        words = {name: str(part[name]) for name in ("why", "lack")}
+        return Look(LookEnd(str(part["end"])), float(part["value"]), part["x"], part["postures"], **words)
 
     def keep(self, number: int, look: Look) -> Look:
         """Keep a look, and hand it back.
@@ -73,7 +74,8 @@ class KeptLooks:
         """
         if not self._keeps:
             return look
-        values = {"end": str(look.end), "why": look.why, "value": look.value, "x": look.x, "postures": look.postures}
+        words = {"end": str(look.end), "why": look.why, "lack": look.lack}
+        values = {**words, "value": look.value, "x": look.x, "postures": look.postures}
         write_run_file(self._path(number), self._digest, values)
         return look
 

@@ -19,9 +19,9 @@ from graspatlas.support.words import Word
 __all__ = ["COLUMNS", "Proposal", "Proposals", "ProposalsEnd", "Tried"]
 
 #: Columns of the table: which link on which region, how promising it was, what came of a first look, the requirement
-#: that was missed, the index of the best grasp of the look and after the atlas, its charts, those that meet the
-#: requirements, and the folder.
-COLUMNS = ("assignment", "distance", "end", "missed", "first_value", "value", "charts", "accepted", "folder")
+#: that was missed and what the grasp lacks that came nearest, the index of the best grasp of the look and after the
+#: atlas, its charts, those that meet the requirements, and the folder.
+COLUMNS = ("assignment", "distance", "end", "missed", "lack", "first_value", "value", "charts", "accepted", "folder")
 
 
 class ProposalsEnd(Word):
@@ -43,6 +43,7 @@ class Tried:
         end: What came of it.
         value: The index of the best grasp that was found; -inf where none meets the requirements.
         why: The requirement that was missed, where one was.
+        lack: What the grasp lacks that came nearest to meeting the requirements, where none did.
     """
 
     links: tuple[str, ...]
@@ -51,6 +52,7 @@ class Tried:
     end: LookEnd
     value: float
     why: str
+    lack: str = ""
 
     @property
     def reason(self) -> str:
@@ -181,6 +183,7 @@ def _row(tried: Tried, proposal: Proposal | None) -> dict[str, Any]:
         "distance": tried.score,
         "end": str(tried.end),
         "missed": tried.why,
+        "lack": tried.lack,
         "first_value": tried.value if met else float("nan"),
     }
     if proposal is None:

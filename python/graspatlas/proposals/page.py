@@ -96,8 +96,9 @@ def _notes(found: Proposals) -> str:
 def _row(row: dict[str, object]) -> str:
     value = row["value"] if row["value"] == row["value"] else row["first_value"]
     shown = f"{value:.4g}" if value == value else ""
-    end = str(row["end"]) + (f": {row['missed']}" if row["missed"] else "")
+    end = html.escape(str(row["end"]) + (f": {row['missed']}" if row["missed"] else ""))
+    lack = f"<br><small>nearest: {html.escape(str(row['lack']))}</small>" if row["lack"] else ""
     return (
         f'<tr><td>{html.escape(str(row["assignment"]))}</td><td class="number">{row["distance"]:.3g}</td>'
-        f'<td>{html.escape(end)}</td><td class="number">{shown}</td></tr>'
+        f'<td>{end}{lack}</td><td class="number">{shown}</td></tr>'
     )

@@ -232,4 +232,5 @@ def _tried(assignment: Assignment, look: Look) -> Tried:
         end=look.end,
         value=look.value,
         why=look.why,
+        lack=look.lack,
     )

@@ -14,6 +14,7 @@ import numpy as np
 
 from graspatlas.analysis.objective import Objective
 from graspatlas.errors import GraspAtlasError
+from graspatlas.grasps.grasps import Grasps
 from graspatlas.hand.motions import HandMotions
 from graspatlas.optimizer.optimize import optimize
 from graspatlas.problem.contacts import Contact
@@ -25,6 +26,7 @@ from graspatlas.proposals.pinning import pinned
 from graspatlas.proposals.plan import Plan
 from graspatlas.quality.batched import quality_name
 from graspatlas.requirements.base import asked, requirement_name
+from graspatlas.requirements.rejections import nearest, rejections
 from graspatlas.result.result import Result
 from graspatlas.search.grasp_search import GraspSearch
 from graspatlas.support.arrays import Array
@@ -61,6 +63,8 @@ class Look:
         x: That grasp (size of x,), or nothing.
         postures: Postures of the grasps that were found (n, nq).
         why: The requirement that was missed, where one was.
+        lack: What the grasp lacks that came nearest to meeting the requirements, where none did; see
+            :mod:`graspatlas.requirements.rejections`.
     """
 
     end: LookEnd
@@ -68,6 +72,7 @@ class Look:
     x: Array
     postures: Array
     why: str = ""
+    lack: str = ""
 
 
 def problem_of(plan: Plan, assignment: Assignment) -> Problem:
@@ -115,7 +120,8 @@ def look_at(plan: Plan, assignment: Assignment) -> Look:
     there = ends.x[[status != "not met" for status in ends.status]]
     there = there[objective.meets(there)]
     if not len(there):
-        return Look(LookEnd.MISSED, -np.inf, nothing, X[:, :nq], _missed(plan, objective, ends.x))
+        missed, lack = _missed(plan, objective, ends.x), _lacking(plan, objective.grasps(ends.x))
+        return Look(LookEnd.MISSED, -np.inf, nothing, X[:, :nq], missed, lack)
     values = objective.values(there)
     postures = np.vstack([X[:, :nq], there[:, :nq]])
     for i in np.argsort(-values, kind="stable"):
@@ -129,6 +135,13 @@ def _missed(plan: Plan, objective: Objective, X: Array) -> str:
     grasps = objective.grasps(X)
     shares = [(float(asked(each, grasps).mean()), requirement_name(each)) for each in plan.requirements]
     return min(shares)[1] if shares else ""
+
+
+def _lacking(plan: Plan, grasps: Grasps) -> str:
+    """What the grasp lacks that comes nearest to meeting the requirements."""
+    chosen = nearest(plan.requirements, grasps, np.zeros(len(grasps)))
+    one = Grasps(grasps.problem, grasps.x[chosen], grasps.system)
+    return "; ".join(map(str, rejections(plan.requirements, one)))
 
 
 def atlas_of(plan: Plan, assignment: Assignment, look: Look, max_seconds: float | None) -> Result:

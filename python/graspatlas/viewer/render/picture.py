@@ -16,6 +16,7 @@ from graspatlas.viewer.render.shading import FloorShadow, Shadow, crevices, lamp
 from graspatlas.viewer.render.text_images import GREY, LINE, SMALL, caption_image, legend_image, text_image
 from graspatlas.viewer.scene.camera import Camera
 from graspatlas.viewer.scene.captions import Caption, caption, scene_legend, subtitle
+from graspatlas.viewer.scene.meshes import Mesh
 from graspatlas.viewer.scene.scene import SHOW_THROUGH, Part, Scene
 
 __all__ = ["check_size", "draw", "painted"]
@@ -117,9 +118,20 @@ class _Triangles:
         owner = np.repeat(np.arange(len(parts)), [len(m.faces) for m in placed])
         colours = np.array([part.colour for part in parts]).reshape(-1, 4)
         self.colours = np.column_stack([to_linear(colours[:, :3]), colours[:, 3]]).astype(np.float32)[owner]
-        seen = camera.project(self.points.reshape(-1, 3), width / height)
-        x, y = (seen[:, 0] + 1.0) * width / 2.0, (1.0 - seen[:, 1]) * height / 2.0
-        self.screen = np.column_stack([x, y, seen[:, 2]]).reshape(-1, 3, 3)
+        seen = np.concatenate([none, *(_on_screen(m, camera, width, height)[m.faces] for m in placed)])
+        self.screen = seen.reshape(-1, 3, 3)
+
+
+def _on_screen(mesh: Mesh, camera: Camera, width: int, height: int) -> Array:
+    """Vertices of a placed mesh on the screen (n, 3): right and down in pixels, and their nearness [1/m]."""
+    seen = camera.project(mesh.vertices, width / height)
+    return np.column_stack([(seen[:, 0] + 1.0) * width / 2.0, (1.0 - seen[:, 1]) * height / 2.0, seen[:, 2]])
+
+
+def _corners(parts: list[Part]) -> Array:
+    """Corners of the triangles of parts, placed in the world (f, 3, 3), metres."""
+    placed = (part.mesh.moved(part.T) for part in parts)
+    return np.concatenate([np.zeros((0, 3, 3)), *(mesh.vertices[mesh.faces] for mesh in placed)])
 
 
 class _Painter:
