@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +91,30 @@ def test_depths_in_object_and_obstacle_are_said() -> None:
     assert found.clash.names[1] == "table"
     assert found.clash.groups == ("hand", "obstacle") if found.clash.names[0] != "cylinder" else ("object", "obstacle")
     assert found.why == f"{found.clash.names[0]} is {-1000.0 * found.clash.distance:.3g} mm inside table"
+
+
+@dataclass(frozen=True)
+class Outside(ga.requirements.Requirement):
+    """A requirement of one's own, of which only the answer is known."""
+
+    def met(self, grasps: ga.Grasps) -> NDArray[np.bool_]:
+        return np.zeros(len(grasps), bool)
+
+    def __str__(self) -> str:
+        return "outside"
+
+
+def test_what_cannot_be_measured_does_not_hide_the_rest(bare: ga.Result) -> None:
+    result = read_again(bare, Outside(), ga.ForceClosure(0.5, 0.3))
+    assert result.nearest is not None
+    chart = result.nearest.chart
+    lacks = lacking_closure(grasps_of(result), 0.3)
+    assert chart == lacks.argmin()
+    assert [(each.requirement, np.isfinite(each.shortfall)) for each in result.rejections(chart)] == [
+        ("outside", False),
+        ("force_closure:0.5:0.3", True),
+    ]
+    assert result.summary()["nearest"]["rejected_by"][0] == {"requirement": "outside", "shortfall": None, "why": ""}
 
 
 def test_functions_are_not_asked_again_and_count_last(bare: ga.Result, tmp_path: Path) -> None:

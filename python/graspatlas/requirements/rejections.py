@@ -5,8 +5,9 @@ tangent coordinate: of force closure the margin, of the holding force the share 
 or way [m], of collisions the depth, or the distance that is missing, divided by the problem's length scale.
 
 The *nearest* of rejected grasps is the one that the fewest named requirements reject; of those the one whose largest
-shortfall is the smallest; of equals the one of the largest index. Functions of the user's have no shortfall, and are
-not asked again: they have rejected what the named requirements accept and the result does not.
+shortfall is the smallest, one that cannot be measured being larger than all others; of equals the one of the largest
+index. Functions of the user's have no shortfall, and are not asked again: they have rejected what the named
+requirements accept and the result does not.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from graspatlas.collision.clash import Clash
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.requirements.base import Requirement, RequirementLike, asked, requirement_name
 from graspatlas.requirements.lost import kept
-from graspatlas.support.arrays import Array, IntArray
+from graspatlas.support.arrays import Array, BoolArray, IndexArray, IntArray
 
 __all__ = ["Rejection", "nearest", "rejections"]
 
@@ -47,7 +48,7 @@ class Rejection:
 
 
 def rejections(requirements: Sequence[RequirementLike], grasp: Grasps) -> tuple[Rejection, ...]:
-    """What requirements have against a grasp that they do not accept, the named ones first asked.
+    """What requirements have against a grasp that they do not accept.
 
     Args:
         requirements: The requirements.
@@ -75,19 +76,22 @@ def nearest(requirements: Sequence[RequirementLike], grasps: Grasps, values: Arr
     rejected = np.array([~asked(each, grasps) for each in named], bool).reshape(len(named), len(grasps))
     counts = rejected.sum(axis=0)
     few = np.flatnonzero(counts == counts.min())
-    largest = _largest_shortfalls(named, rejected[:, few], grasps, few)
-    return int(few[np.lexsort((-values[few], largest))[0]])
+    unmeasured, largest = _shortfalls(named, rejected[:, few], grasps, few)
+    return int(few[np.lexsort((-values[few], largest, unmeasured))[0]])
 
 
-def _largest_shortfalls(named: Sequence[Requirement], rejected: Array, grasps: Grasps, chosen: IntArray) -> Array:
-    """The largest shortfall of each of some grasps (m,), of those requirements that reject it."""
-    largest = np.zeros(len(chosen))
+def _shortfalls(
+    named: Sequence[Requirement], rejected: BoolArray, grasps: Grasps, chosen: IndexArray
+) -> tuple[IntArray, Array]:
+    """How many requirements reject each of m grasps unmeasured, and the largest of its other shortfalls."""
+    unmeasured, largest = np.zeros(len(chosen), np.int64), np.zeros(len(chosen))
     for requirement, missed in zip(named, rejected, strict=True):
         rows = np.flatnonzero(missed)
         if len(rows):
-            those = Grasps(grasps.problem, grasps.x[chosen[rows]], grasps.system)
-            largest[rows] = np.maximum(largest[rows], requirement.shortfalls(those))
-    return largest
+            by = requirement.shortfalls(Grasps(grasps.problem, grasps.x[chosen[rows]], grasps.system))
+            unmeasured[rows] += ~np.isfinite(by)
+            largest[rows] = np.maximum(largest[rows], np.where(np.isfinite(by), by, 0.0))
+    return unmeasured, largest
 
 
 def _named(requirements: Sequence[RequirementLike]) -> list[Requirement]:
