@@ -86,7 +86,7 @@ def _grasp(grasp: Grasp) -> Image.Image:
     shapes = _shapes(grasp.problem)
     size = size_of(body_parts(shapes, grasp))
     parts, _ = grasp_parts(shapes, grasp, size)
-    direction = direction_to([subject_of(parts, grasp, size)], grasp.problem.object_joint_model)
+    direction = direction_to([subject_of(parts, size)], grasp.problem.object_joint_model)
     camera = fitted_camera(vertices_of(parts, ("hand", "object", "normal")), direction, WIDE / HIGH, WINDOW)
     return painted(parts, camera, WIDE, HIGH)
 

@@ -101,19 +101,13 @@ def _write_legend(image: Image.Image, scene: Scene, size: float) -> None:
     image.paste(head, (int(0.8 * size), int(0.7 * size)), head)
 
 
-def _corners(parts: list[Part]) -> Array:
-    """Corners of the triangles of parts in the world [f, 3, 3], metres."""
-    placed = [part.mesh.moved(part.T) for part in parts]
-    return np.concatenate([np.zeros((0, 3, 3)), *(mesh.vertices[mesh.faces] for mesh in placed)])
-
-
 class _Triangles:
     """Triangles of several parts, placed in the world and on the screen."""
 
     def __init__(self, parts: list[Part], camera: Camera, width: int, height: int) -> None:
         placed = [part.mesh.moved(part.T) for part in parts]
         none = np.zeros((0, 3, 3))
-        self.points = _corners(parts)
+        self.points = np.concatenate([none, *(m.vertices[m.faces] for m in placed)])
         self.normals = np.concatenate([none, *(m.normals[m.faces] for m in placed)]).astype(np.float32)
         owner = np.repeat(np.arange(len(parts)), [len(m.faces) for m in placed])
         colours = np.array([part.colour for part in parts]).reshape(-1, 4)
