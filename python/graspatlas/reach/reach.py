@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -17,6 +16,7 @@ from graspatlas.support.arrays import Array, BoolArray
 from graspatlas.support.pickling import Light
 from graspatlas.support.progress import progress_bar
 from graspatlas.support.validation import read_only
+from graspatlas.support.words import Word
 
 if TYPE_CHECKING:
     from graspatlas.problem.problem import Problem
@@ -31,15 +31,12 @@ BATCH = 1024
 SEEDS, POSTURES = 24, 2048
 
 
-class ReachStatus(Enum):
+class ReachStatus(Word):
     """What the search for a posture of the arm found."""
 
     FOUND = "found"
     NO_POSTURE = "no posture found"
     HITS = "each posture found hits something"
-
-    def __str__(self) -> str:
-        return self.value
 
 
 #: By the numbers of the core.
