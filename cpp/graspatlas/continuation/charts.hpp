@@ -7,7 +7,7 @@
 
 #include "graspatlas/continuation/chart.hpp"
 #include "graspatlas/continuation/neighbours.hpp"
-#include "graspatlas/continuation/rows.hpp"
+#include "graspatlas/continuation/stable_rows.hpp"
 #include "graspatlas/memory.hpp"
 #include "graspatlas/parallel.hpp"
 
@@ -70,8 +70,8 @@ class Charts {
 
  private:
   int x_size_, forgotten_ = 0;
-  Rows<Chart> charts_;
-  Rows<double> rows_;  // centre and basis
+  StableRows<Chart> charts_;
+  StableRows<double> rows_;  // centre and basis
   Neighbours index_;
   std::vector<double> scales_;
   std::mutex adding_;

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "graspatlas/continuation/rows.hpp"
+#include "graspatlas/continuation/stable_rows.hpp"
 
 namespace graspatlas {
 
@@ -72,8 +72,8 @@ class Neighbours {
 
   int size_, count_ = 0, root_ = -1;
   std::vector<Node> nodes_;
-  Rows<double> buckets_;      // a bucket is a row: kBucket points [size]
-  std::vector<int> numbers_;  // of the buckets, kBucket each
+  StableRows<double> buckets_;  // a bucket is a row: kBucket points [size]
+  std::vector<int> numbers_;    // of the buckets, kBucket each
   std::vector<int> free_nodes_, free_buckets_;
   // What a rebuild collects; kept, because leaves are split all the time.
   std::vector<int> collected_numbers_;

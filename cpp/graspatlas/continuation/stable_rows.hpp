@@ -17,16 +17,16 @@ namespace graspatlas {
 ///
 /// One thread at a time may add rows; others may read the rows they know of meanwhile.
 template <class T>
-class Rows {
+class StableRows {
  public:
-  explicit Rows(int row_size) : row_size_(row_size) {}
-  ~Rows() {
+  explicit StableRows(int row_size) : row_size_(row_size) {}
+  ~StableRows() {
     if constexpr (!std::is_trivially_destructible_v<T>)
       for (std::size_t i = 0; i < count_; ++i) std::destroy_n(row(i), row_size_);
   }
-  Rows(const Rows&) = delete;
-  Rows& operator=(const Rows&) = delete;
-  Rows& operator=(Rows&& other) noexcept {
+  StableRows(const StableRows&) = delete;
+  StableRows& operator=(const StableRows&) = delete;
+  StableRows& operator=(StableRows&& other) noexcept {
     std::swap(row_size_, other.row_size_);
     std::swap(count_, other.count_);
     std::swap(blocks_, other.blocks_);
