@@ -18,7 +18,7 @@ import graspatlas as ga
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.proposals.outcome import COLUMNS
 from graspatlas.proposals.propose import _schedule
-from graspatlas.proposals.trial import LookEnd
+from graspatlas.proposals.trials.trial import LookEnd
 from graspatlas.requirements.base import asked
 
 
@@ -88,7 +88,7 @@ def test_looks_are_not_done_twice_and_edits_stay(
     def again(*_: object) -> None:
         raise AssertionError("it was looked at before")
 
-    monkeypatch.setattr("graspatlas.proposals.looks.look_at", again)
+    monkeypatch.setattr("graspatlas.proposals.trials.looks.look_at", again)
     found = ga.propose(HAND, can_file, tmp_path / "again", links=LINKS, top=1, max_seconds=None)
     assert [each.value for each in found.tried] == [each.value for each in proposed.tried]
     assert len(found.proposals) == 1
@@ -148,7 +148,7 @@ def test_an_atlas_that_cannot_grow_is_said(
     def fails(*_: object) -> None:
         raise ga.GraspAtlasError("it is singular there")
 
-    monkeypatch.setattr(import_module("graspatlas.proposals.propose"), "atlas_of", fails)
+    monkeypatch.setattr(import_module("graspatlas.proposals.trials.atlases"), "atlas_of", fails)
     shutil.copytree(output / "looks", tmp_path / "looks")
     found = ga.propose(HAND, can_file, tmp_path, links=LINKS, top=2, max_seconds=None)
     assert not found.proposals

@@ -44,8 +44,8 @@ def add_commands(commands: Subcommands) -> None:
     some.add_argument("--top", type=int, metavar="N", help="how many grasps to propose at most, 5 by default")
     some.add_argument("--max-seconds", type=float, metavar="S", help="time for all of it, 90 s by default")
     some.add_argument("--seed", type=int, default=0, metavar="N", help="of the random numbers")
-    some.add_argument("--workers", type=int, metavar="N", help="look at assignments in so many processes")
-    some.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler whose workers look at assignments")
+    some.add_argument("--workers", type=int, metavar="N", help="do looks and atlases in so many processes")
+    some.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler whose workers do looks and atlases")
     some.add_argument("--json", action="store_true", help="print one JSON object on standard output")
     some.set_defaults(run=_propose)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from graspatlas.grasps.grasp import Grasp
 from graspatlas.proposals.assignments.matching import Counts
-from graspatlas.proposals.trial import LookEnd
+from graspatlas.proposals.trials.trial import LookEnd
 from graspatlas.quality.batched import Quality, quality_name
 from graspatlas.result.result import Result
 from graspatlas.storage.files import write_csv

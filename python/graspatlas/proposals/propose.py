@@ -14,13 +14,14 @@ from graspatlas.problem.requirement import StatedRequirement
 from graspatlas.problem.validation import check_obstacles
 from graspatlas.proposals.assignments.matching import Assignment
 from graspatlas.proposals.files import folder_name, problem_file, write_text
-from graspatlas.proposals.kept_looks import KeptLooks
-from graspatlas.proposals.looks import Looker, OnWorkers, here, looks_at
 from graspatlas.proposals.outcome import Proposal, Proposals, ProposalsEnd, Tried
 from graspatlas.proposals.page import REGIONS, write_page, write_regions, write_views
 from graspatlas.proposals.plan import Plan
 from graspatlas.proposals.setting import made_ready
-from graspatlas.proposals.trial import Look, LookEnd, atlas_of
+from graspatlas.proposals.trials.atlases import GROWING, Grower, GrowOnWorkers, atlases_of, best_looks, grow_here
+from graspatlas.proposals.trials.kept_looks import KeptLooks
+from graspatlas.proposals.trials.looks import Looker, LookOnWorkers, look_here, looks_at
+from graspatlas.proposals.trials.trial import Look
 from graspatlas.quality.batched import Quality
 from graspatlas.quality.evaluation import find_index
 from graspatlas.requirements.base import RequirementLike
@@ -29,8 +30,8 @@ from graspatlas.requirements.force_closure import ForceClosure
 from graspatlas.requirements.screening import check_requirements
 from graspatlas.result.result import Result
 from graspatlas.storage.files import writable_folder
-from graspatlas.support.deadlines import deadline_after, seconds_until
-from graspatlas.support.interrupts import stoppable, stopping
+from graspatlas.support.deadlines import deadline_after
+from graspatlas.support.interrupts import stoppable
 from graspatlas.support.progress import progress_bar
 from graspatlas.support.validation import whole
 from graspatlas.world.obstacle import Obstacle
@@ -43,14 +44,12 @@ MAX_SECONDS, LOOKING = 90.0, 0.5
 TOP = 5
 #: What is required where nothing is said.
 REQUIREMENTS = (ForceClosure(0.5, 0.02), CollisionFree())
-#: Time that an atlas takes, about, and the picture and the page of its grasps [s].
-GROWING, VIEWING = 4.0, 2.0
+#: Time that the picture and the page of an atlas take, about [s].
+VIEWING = 2.0
 #: Files about all of it.
 PAGE, TABLE = "proposals.html", "proposals.csv"
 #: Files of a proposal.
 PROBLEM, RESULT = "problem.yaml", "result.npz"
-#: Time that an atlas is given where none is left [s].
-SHORTEST = 1.0
 
 
 @stoppable()
@@ -95,8 +94,8 @@ def propose(
         top: How many grasps to propose at most.
         max_seconds: Time for all of it; None for as long as it takes.
         seed: Of the random numbers.
-        workers: Processes on this machine to look at assignments in; this one by default.
-        scheduler: Address of a Dask scheduler, whose workers look at assignments.
+        workers: Processes on this machine for looks and atlases; this one by default.
+        scheduler: Address of a Dask scheduler, whose workers do looks and atlases.
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
     Returns:
@@ -115,10 +114,11 @@ def propose(
     _check_requirements_see(obstacles, on_table, require)
     _check_no_arm(require)
     whole(seed, "seed", 0)
-    looker: Looker = here
+    looker: Looker = look_here
+    grower: Grower = grow_here
     if workers is not None or scheduler is not None:
-        check_workers("looking at assignments on workers", workers, scheduler)
-        looker = OnWorkers(workers, scheduler)
+        check_workers("proposals on workers", workers, scheduler)
+        looker, grower = LookOnWorkers(workers, scheduler), GrowOnWorkers(workers, scheduler)
     folder = writable_folder(output)
     around = (tuple(obstacles), on_table)
     setting = made_ready(named_hand(os.fspath(hand)), Path(mesh), scale, folder, fingers, links, *around, seed)
@@ -140,7 +140,9 @@ def propose(
     results: dict[int, Result] = {}
     faults: list[str] = []
     if end is not ProposalsEnd.INTERRUPTED:
-        results, faults, atlases_end = _atlases(plan, setting.assignments, looks, top, grown, progress)
+        best = best_looks(looks, top)
+        with progress_bar("atlases", total=len(best), progress=progress) as bar:
+            results, faults, atlases_end = atlases_of(plan, setting.assignments, looks, best, grower, grown, bar)
         end = end if atlases_end is ProposalsEnd.COMPLETE else atlases_end
     proposals = [
         _written(plan, setting.assignments[i], Proposal(tried[i], result, folder / folder_name(i, tried[i].name)))
@@ -178,39 +180,6 @@ def _schedule(start: float, deadline: float, top: int) -> tuple[float, float]:
         return deadline, deadline
     looked = max(deadline - top * (GROWING + VIEWING), start + LOOKING * (deadline - start))
     return looked, looked + GROWING / (GROWING + VIEWING) * (deadline - looked)
-
-
-def _atlases(
-    plan: Plan,
-    assignments: Sequence[Assignment],
-    looks: Sequence[Look],
-    top: int,
-    deadline: float,
-    progress: bool | None,
-) -> tuple[dict[int, Result], list[str], ProposalsEnd]:
-    """The atlases of the assignments with the best looks, by number; what went wrong; and why they ended."""
-    met = [i for i, look in enumerate(looks) if look.end is LookEnd.MET]
-    best = sorted(met, key=lambda i: -looks[i].value)[:top]
-    results: dict[int, Result] = {}
-    faults: list[str] = []
-    with progress_bar("atlases", total=len(best), progress=progress) as bar:
-        for done, i in enumerate(best):
-            if results and time.perf_counter() > deadline:
-                return results, faults, ProposalsEnd.TIME_LIMIT
-            left = seconds_until(deadline, SHORTEST)
-            seconds = None if left is None else max(left / (len(best) - done), SHORTEST)
-            try:
-                result = atlas_of(plan, assignments[i], looks[i], seconds)
-                if result.accepted.any() or result.refinement:
-                    results[i] = result
-            except GraspAtlasError as error:  # singular where charts would be
-                faults.append(f"no atlas of {assignments[i].name}: {error}")
-            except KeyboardInterrupt:
-                return results, faults, ProposalsEnd.INTERRUPTED
-            if stopping():
-                return results, faults, ProposalsEnd.INTERRUPTED
-            bar.update()
-    return results, faults, ProposalsEnd.COMPLETE
 
 
 def _written(plan: Plan, assignment: Assignment, proposal: Proposal) -> Proposal:

@@ -10,7 +10,7 @@ from pathlib import Path
 from graspatlas.problem.requirement import StatedRequirement
 from graspatlas.proposals.assignments.matching import Assignment
 from graspatlas.proposals.plan import Plan
-from graspatlas.proposals.trial import Look, LookEnd
+from graspatlas.proposals.trials.trial import Look, LookEnd
 from graspatlas.quality.batched import quality_name
 from graspatlas.requirements.base import requirement_name
 from graspatlas.storage.run_files import damaged, read_run_file, write_run_file

@@ -9,14 +9,14 @@ from typing import TypeAlias
 from graspatlas.cluster.sealing import sealed
 from graspatlas.cluster.workers import Workers
 from graspatlas.proposals.assignments.matching import Assignment
-from graspatlas.proposals.kept_looks import KeptLooks
 from graspatlas.proposals.outcome import ProposalsEnd
 from graspatlas.proposals.plan import Plan
-from graspatlas.proposals.trial import Look, LookEnd, look_at
+from graspatlas.proposals.trials.kept_looks import KeptLooks
+from graspatlas.proposals.trials.trial import Look, LookEnd, look_at
 from graspatlas.requirements.base import users_functions
 from graspatlas.support.progress import ProgressBar
 
-__all__ = ["Looker", "OnWorkers", "here", "looks_at"]
+__all__ = ["LookOnWorkers", "Looker", "look_here", "looks_at"]
 
 #: Where looks are done: those of some numbers, in their order, as long as they come before a deadline.
 Looker: TypeAlias = Callable[[Plan, Sequence[Assignment], Sequence[int], float], Generator[Look, None, None]]
@@ -67,7 +67,7 @@ def looks_at(
     return looks, ProposalsEnd.COMPLETE
 
 
-def here(
+def look_here(
     plan: Plan, assignments: Sequence[Assignment], numbers: Sequence[int], deadline: float
 ) -> Generator[Look, None, None]:
     """Looks in this process; a :data:`Looker`."""
@@ -77,7 +77,7 @@ def here(
         yield look_at(plan, assignments[number])
 
 
-class OnWorkers(Workers):
+class LookOnWorkers(Workers):
     """Looks on workers; a :data:`Looker`."""
 
     def __call__(

@@ -22,8 +22,8 @@ from graspatlas.problem.problem import Problem
 from graspatlas.problem.requirement import StatedRequirement
 from graspatlas.proposals.assignments.fingers import touched
 from graspatlas.proposals.assignments.matching import Assignment
-from graspatlas.proposals.pinning import pinned
 from graspatlas.proposals.plan import Plan
+from graspatlas.proposals.trials.pinning import pinned
 from graspatlas.quality.batched import quality_name
 from graspatlas.requirements.base import asked, requirement_name
 from graspatlas.requirements.rejections import nearest, rejections

@@ -1,0 +1,1 @@
+"""Assignments tried: first looks, and the atlases of the best."""
