@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -87,14 +88,12 @@ def _climb(session: Session, asked: StatedTable) -> tuple[str, Work]:
 def _do_climb(session: Session, number: int, free: bool, job: Job) -> str:
     result = session.result
     x, chart, _ = session.grasp(number)
-    steps, first, end = 0, float("nan"), None
-    while end is None or not (_ended(end) or job.stopping or steps >= MAX_STEPS):
-        before = end
-        end = climb(result, x, all_motions=free, max_steps=MAX_STEPS - steps, max_seconds=CLIMB_SECONDS)
-        first = float(end.qualities[0]) if before is None else first
-        steps, x = steps + end.n_steps, end.x
-        job.report(steps, MAX_STEPS, f"steps, {end.quality:.4g}")
-        if before is not None and not end.n_steps:
+    end = climb(result, x, all_motions=free, max_seconds=CLIMB_SECONDS)
+    while not (_ended(end) or job.stopping or end.n_steps >= MAX_STEPS):
+        job.report(end.n_steps, MAX_STEPS, f"steps, {end.quality:.4g}")
+        more = climb(result, end.x, all_motions=free, max_steps=MAX_STEPS - end.n_steps, max_seconds=CLIMB_SECONDS)
+        end = replace(more, qualities=np.concatenate([end.qualities, more.qualities[1:]]))
+        if not more.n_steps:
             break
     status = _status(end)
     system = result.problem.full_system if free else result.system
@@ -104,7 +103,7 @@ def _do_climb(session: Session, number: int, free: bool, job: Job) -> str:
         Added(grasps, np.ones(1, bool), np.array([end.quality]), [title], [status], free, None, end)
     )
     job.show = [number, new]
-    return f"{first:.4g} \u2192 {end.quality:.4g} after {steps} steps: {status}"
+    return f"{end.qualities[0]:.4g} \u2192 {end.quality:.4g} after {end.n_steps} steps: {status}"
 
 
 def _ended(end: Climb) -> bool:
@@ -198,19 +197,19 @@ def _do_simulate(session: Session, number: int, protocol: str, job: Job) -> str:
 def _trial_lines(trials: Simulation) -> Iterator[str]:
     """What a trial has shown, in words."""
     trial = trials.trial(0)
-    head = f"Simulated ({trials.protocol}, friction {trials.friction:g}): "
     if trial["unstable"]:
-        yield head + "MuJoCo gave it up, because its numbers grew without bound."
+        yield "MuJoCo gave it up, because its numbers grew without bound"
         return
     if trial["lost_while"] == "closing":
-        yield head + "the object is lost while the hand closes."
+        yield "the object is lost while the hand closes"
     else:
-        yield head + f"the object stays under {trial['survived']} of {trial['of']} pushes."
+        yield f"the object stays under {trial['survived']} of {trial['of']} pushes"
+    yield f"Protocol {trials.protocol}, friction {trials.friction:g}."
     if trial["shift_mm"] is not None and trial["turn_deg"] is not None:
         yield f"It moves {trial['shift_mm']:.1f} mm and turns {trial['turn_deg']:.1f}\u00b0 at most."
     if trial["breaking_force_n"] is not None and trial["lost_while"] != "closing":
-        yield f"A push that grows takes it at {trial['breaking_force_n']:.2f} N, in the direction that is worst."
-    if trial["penetration_mm"] > 0.0:
+        yield f"A push that grows takes the object at {trial['breaking_force_n']:.2f} N, in the direction that is worst."
+    if trial["penetration_mm"] >= 0.05:
         yield f"Before closing, hand and object overlap by {trial['penetration_mm']:.1f} mm."
     if not trial["pregrasp_reached"]:
         yield f"The fingertips begin only {trial['pregrasp_mm']:.1f} mm off the object."

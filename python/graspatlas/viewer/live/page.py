@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-from functools import cached_property
 from importlib import resources
 from importlib.util import find_spec
-from string import Template
 
 from graspatlas.quality.evaluation import INDICES
 from graspatlas.simulation.protocols import PROTOCOLS
@@ -40,7 +38,7 @@ class LivePage:
             facts=self._facts(),
             controls=read("controls.html"),
             style=read("style.css"),
-            scripts="\n".join(read(f"scripts/{name}.js") for name in ("added", "live")),
+            scripts="\n".join(read(f"scripts/{name}.js") for name in ("asked", "added", "live")),
         )
         self._text = explorer_page(session.result, chart, session.charts, additions)
 
@@ -57,7 +55,7 @@ class LivePage:
         """The page with a token."""
         return self._text.replace(json.dumps(NO_TOKEN), json.dumps(token), 1)
 
-    def news(self, since: int) -> PlainTable:
+    def news(self, since: int, epoch: int = 0) -> PlainTable:
         """What the page does not know yet."""
         return self.session.state(since)
 

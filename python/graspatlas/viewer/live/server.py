@@ -33,6 +33,8 @@ PORT = 7100
 TOKEN_HEADER = "X-Graspatlas-Token"
 #: Requests are short [bytes].
 LONGEST = 10_000
+#: So are the numbers in them [digits].
+LONGEST_NUMBER = 9
 
 
 class Page(Protocol):
@@ -41,8 +43,8 @@ class Page(Protocol):
     def text(self, token: str) -> str:
         """The page, which is to send the token."""
 
-    def news(self, since: int) -> PlainTable:
-        """What has happened since the page was told so much."""
+    def news(self, since: int, epoch: int) -> PlainTable:
+        """What has happened since the page was told so much, in this epoch of what it is told."""
 
     def ask(self, asked: StatedTable) -> PlainTable:
         """Do what the page asks for.
@@ -130,10 +132,8 @@ class _Handler(BaseHTTPRequestHandler):
         if path == "/":
             self._answer(HTTPStatus.OK, self.of.page.text(self.of.token).encode("utf-8"), "text/html; charset=utf-8")
         elif path == "/news":
-            since = query.get("since", ["0"])[0]
-            if not since.isdecimal() or len(since) > 9:
-                raise GraspAtlasError(f"since must be a whole number, got {shown(since)}")
-            self._tell(HTTPStatus.OK, self.of.page.news(int(since)))
+            since, epoch = (_count(query, name) for name in ("since", "epoch"))
+            self._tell(HTTPStatus.OK, self.of.page.news(since, epoch))
         else:
             self._tell(HTTPStatus.NOT_FOUND, {"error": "there is no such page"})
 
@@ -196,6 +196,14 @@ class _Handler(BaseHTTPRequestHandler):
 
     def log_message(self, *_: object) -> None:
         """Nothing: the terminal is for the user."""
+
+
+def _count(query: dict[str, list[str]], name: str) -> int:
+    """A number of a request, 0 where it has none."""
+    text = query.get(name, ["0"])[0]
+    if not (text.isascii() and text.isdecimal()) or len(text) > LONGEST_NUMBER:
+        raise GraspAtlasError(f"{name} must be a whole number, got {shown(text)}")
+    return int(text)
 
 
 def _listening(host: str, port: int, handler: type[BaseHTTPRequestHandler]) -> ThreadingHTTPServer:

@@ -418,12 +418,3 @@ class AtlasView {
     return found;
   }
 }
-
-// A white disc, for round points.
-function disc() {
-  const canvas = element("canvas", { width: 32, height: 32 }), context = canvas.getContext("2d");
-  context.fillStyle = "#fff";
-  context.arc(16, 16, 15, 0, 2 * Math.PI);
-  context.fill();
-  return new THREE.CanvasTexture(canvas);
-}

@@ -98,12 +98,7 @@ class Controls {
     byId("scale-low").textContent = short(low);
     byId("scale-high").textContent = short(high);
     byId("scale-unit").textContent = [index.label, index.unit, selection.log ? "logarithmic" : ""].filter(Boolean).join(", ");
-    const context = byId("scale-bar").getContext("2d"), picture = context.createImageData(256, 1);
-    for (let i = 0; i < 256; i++) {
-      viridis(i / 255, picture.data, 4 * i);
-      picture.data[4 * i + 3] = 255;
-    }
-    context.putImageData(picture, 0, 0);
+    drawScale(byId("scale-bar"));
   }
 }
 

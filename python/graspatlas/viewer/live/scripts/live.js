@@ -1,26 +1,12 @@
 // The buttons that ask the server for work, and what comes of it.
 
 const LOOK_EVERY = 200; // milliseconds between two looks at work that goes on
-const TOKEN = "X-Graspatlas-Token";
-
-async function asked(path, body) {
-  const headers = { [TOKEN]: facts.live.token };
-  const options = body ? { method: "POST", headers: { ...headers, "Content-Type": "application/json" }, body: JSON.stringify(body) } : { headers };
-  let response;
-  try {
-    response = await fetch(path, options);
-  } catch {
-    throw new Error("graspatlas does not answer: it has ended, or the connection is lost");
-  }
-  const table = await response.json();
-  if (!response.ok) throw new Error(table.error);
-  return table;
-}
 
 class Live {
   constructor(parts) {
     Object.assign(this, parts);
     this.known = 0; // pieces of news
+    const wanted = location.hash; // before the page writes what it opens at
     this.trials = new Map();
     this.added = new AddedPoints(this.atlas, this.selection);
     this.table.also = (reads) => reads.flatMap(({ grasp }) => this.trialOf(grasp));
@@ -29,12 +15,14 @@ class Live {
     this.selection.on("grasps", () => this.offerGrasps());
     this.offerGrasps();
     this.look(true).then(() => {
+      if (wanted && wanted !== location.hash) history.replaceState(null, "", wanted);
       this.address.follow(); // it may name grasps that have been added
       document.documentElement.dataset.live = "yes";
     });
   }
 
   menus() {
+    byId("index").closest(".bar").append(byId("live-other"));
     const left = facts.live.indices.filter((name) => !facts.indices.some((index) => index.name === name));
     fill(byId("live-index"), ["choose\u2026", ...left.map((name) => name.replaceAll("_", " "))], 0, (i) => {
       if (i) this.ask({ action: "index", index: byId("live-index").options[i].text.replaceAll(" ", "_") });
@@ -174,7 +162,7 @@ class Live {
 
   trialOf(grasp) {
     const trials = this.trials.get(grasp) || [];
-    return trials.map((lines) => element("p", { className: "trial" }, element("b", { textContent: lines[0] }), ` ${lines.slice(1).join(" ")}`));
+    return trials.map((lines) => element("p", { className: "trial" }, element("b", { textContent: `Simulated: ${lines[0]}.` }), ` ${lines.slice(1).join(" ")}`));
   }
 }
 
