@@ -129,9 +129,7 @@ class Charts:
         numbers.add_rounded("object_quat", self._of_all(lambda grasps: grasps.object_quat_xyzw))
         for name, column in zip(("contact_points", "contact_normals"), self._contacts(), strict=True):
             numbers.add_rounded(name, column)
-        axes, semi_axes = (
-            np.concatenate(parts) for parts in zip(*map(velocity_ellipsoids, self.batches), strict=True)
-        )
+        axes, semi_axes = (np.concatenate(parts) for parts in zip(*map(velocity_ellipsoids, self.batches), strict=True))
         numbers.add_rounded("ellipsoid_axes", axes[:, :, :2].swapaxes(1, 2).reshape(len(axes), 6))
         numbers.add_rounded("ellipsoid_lengths", semi_axes, log=True)
         numbers.add_rounded("semi_axes", self._of_all(lambda grasps: grasps.semi_axes), log=True)

@@ -22,7 +22,7 @@ from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import PlainTable
 from graspatlas.viewer.explorer.charts import Charts
-from graspatlas.viewer.explorer.layout import write_layout
+from graspatlas.viewer.explorer.layout import Layout
 from graspatlas.viewer.explorer.numbers import Numbers
 from graspatlas.viewer.explorer.shapes import write_clash, write_shapes
 from graspatlas.viewer.explorer.words import index_tables, requirement_label
@@ -72,27 +72,28 @@ class Additions:
     """What a page has besides, where a server answers it.
 
     Attributes:
+        charts: The grasps of the page.
+        layout: Where it draws them.
         facts: What its scripts know, as ``facts.live``.
         controls: Markup below the buttons that copy.
         style: Style sheet.
         scripts: Scripts, in the scope of the page's own, after them.
     """
 
+    charts: Charts
+    layout: Layout
     facts: PlainTable
     controls: str
     style: str
     scripts: str
 
 
-def explorer_page(
-    result: GraspAtlas, chart: int | None = None, charts: Charts | None = None, additions: Additions | None = None
-) -> str:
+def explorer_page(result: GraspAtlas, chart: int | None = None, additions: Additions | None = None) -> str:
     """The page's text.
 
     Args:
         result: The result.
         chart: The chart that it opens at; by default it opens at the best grasp, the worst beside it.
-        charts: The grasps of the page, where they are known already.
         additions: What the page has besides; with it, it may ask the server that it comes from.
 
     Raises:
@@ -101,7 +102,8 @@ def explorer_page(
     numbers = Numbers()
     nearest = None if result.refinement or result.nearest is None else int(result.nearest.chart)
     opens_at = nearest if chart is None else result.checked_chart(chart)
-    facts = _facts(result, charts or Charts(result), numbers, opens_at)
+    charts, layout = (additions.charts, additions.layout) if additions else (Charts(result), Layout(result.atlas))
+    facts = _facts(charts, layout, numbers, opens_at)
     facts["opens_at"], facts["nearest"] = opens_at, nearest
     facts["numbers"] = numbers.entries  # type: ignore[assignment]  # plain data, but typed more closely
     if additions:
@@ -141,9 +143,9 @@ def _extremes(result: GraspAtlas) -> str:
     return f"{index_name(result)}: {values}"
 
 
-def _facts(result: GraspAtlas, charts: Charts, numbers: Numbers, opens_at: int | None) -> PlainTable:
+def _facts(charts: Charts, layout: Layout, numbers: Numbers, opens_at: int | None) -> PlainTable:
     """What the page knows besides its numbers, which it writes; of the chart that it opens at also what it lacks."""
-    problem = result.problem
+    result, problem = charts.result, charts.result.problem
     shapes = BodyShapes(problem)
     rejected = () if opens_at is None else result.rejections(opens_at)
     clash = clash_of(rejected)
@@ -191,7 +193,7 @@ def _facts(result: GraspAtlas, charts: Charts, numbers: Numbers, opens_at: int |
             "stripes": write_clash(clash, shapes, numbers, size * WIDTH) if clash else [],
             "point": clash.point.tolist() if clash and np.isfinite(clash.point).all() else None,
         },
-        "layout": write_layout(result.atlas, maxima, numbers),
+        "layout": layout.write(maxima, numbers),
         "view": _view(
             shapes, shown, size, None if clash is None or opens_at is None else (result.grasp(opens_at), clash)
         ),

@@ -99,9 +99,7 @@ def _do_climb(session: Session, number: int, free: bool, job: Job) -> str:
     system = result.problem.full_system if free else result.system
     title = "End of a climb" + (", all motions free" if free else "")
     grasps = Grasps(result.problem, end.x, system, [chart])
-    (new,) = session.add(
-        Added(grasps, np.ones(1, bool), np.array([end.quality]), [title], [status], free, None, end)
-    )
+    (new,) = session.add(Added(grasps, np.ones(1, bool), np.array([end.quality]), [title], [status], free, None, end))
     job.show = [number, new]
     return f"{end.qualities[0]:.4g} \u2192 {end.quality:.4g} after {end.n_steps} steps: {status}"
 
@@ -166,7 +164,7 @@ def _as_added(session: Session, samples: Samples) -> Added:
     result, n = session.result, len(samples)
     flat = None
     if result.dimension == 2:
-        centers, R = session.unrolled
+        centers, R = session.layout.unrolled
         flat = centers[samples.charts] + np.einsum("nij,nj->ni", R[samples.charts], samples.u)
     titles = [f"Sample in chart {chart}" for chart in samples.charts]
     grasps = Grasps(result.problem, samples.x, result.system, samples.charts)
@@ -208,7 +206,7 @@ def _trial_lines(trials: Simulation) -> Iterator[str]:
     if trial["shift_mm"] is not None and trial["turn_deg"] is not None:
         yield f"It moves {trial['shift_mm']:.1f} mm and turns {trial['turn_deg']:.1f}\u00b0 at most."
     if trial["breaking_force_n"] is not None and trial["lost_while"] != "closing":
-        yield f"A push that grows takes the object at {trial['breaking_force_n']:.2f} N, in the direction that is worst."
+        yield f"A growing push takes the object at {trial['breaking_force_n']:.2f} N, from the worst direction."
     if trial["penetration_mm"] >= 0.05:
         yield f"Before closing, hand and object overlap by {trial['penetration_mm']:.1f} mm."
     if not trial["pregrasp_reached"]:

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from graspatlas.analysis.climb import Climb
-from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.quality.batched import quality_name
 from graspatlas.quality.evaluation import INDICES, evaluate
 from graspatlas.requirements.base import Requirement, asked, requirement_name
 from graspatlas.requirements.lost import kept
 from graspatlas.result.grasp_atlas import GraspAtlas
-from graspatlas.support.arrays import AnyArray, Array, BoolArray, IntArray
+from graspatlas.support.arrays import AnyArray, Array, BoolArray
 from graspatlas.support.validation import PlainTable
 from graspatlas.viewer.explorer.charts import Charts
 from graspatlas.viewer.explorer.numbers import Numbers
 
-__all__ = ["Added", "packed"]
+__all__ = ["Added", "index_packed", "packed", "values_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +78,7 @@ class _Columns(Charts):
         named = [r for r in kept(self.result.requirements) if isinstance(r, Requirement)]
         bits = np.zeros(len(self._added), np.uint32)
         for bit, requirement in enumerate(named):
-            bits |= (self._of_all(lambda grasps, r=requirement: asked(r, grasps)) == 0.0).astype(np.uint32) << bit
+            bits |= (self._of_all(partial(asked, requirement)) == 0.0).astype(np.uint32) << bit
         by_functions = (bits == 0) & ~self._added.accepted
         if self._n_bits > len(named):
             bits[by_functions] |= np.uint32(1 << len(named))
@@ -109,11 +108,11 @@ def packed(result: GraspAtlas, added: Added, indices: Sequence[str], n_bits: int
     numbers.add("rejections", columns.rejections[1])
     for i, name in enumerate(indices):
         numbers.add(f"index_{i}", values_of(name, result, added))
-    return {"kind": "grasps", "grasps": added.entries(), "entries": numbers.entries, "data": numbers.text()}
+    return {"kind": "grasps", "grasps": added.entries(), **numbers.table()}
 
 
 def index_packed(table: PlainTable, values: Array) -> PlainTable:
     """Values of another index at all grasps of the page, as they are sent."""
     numbers = Numbers()
     numbers.add("values", np.asarray(values, float))
-    return {"kind": "index", "index": table, "entries": numbers.entries, "data": numbers.text()}
+    return {"kind": "index", "index": table, **numbers.table()}

@@ -85,10 +85,11 @@ class Jobs:
             self._thread.start()
         return job
 
-    def stop(self) -> None:
+    def stop(self) -> Job | None:
         """Ask what runs to stop."""
         if self.last is not None:
             self.last.asked.set()
+        return self.last
 
     def wait(self, seconds: float) -> None:
         """Wait for what runs."""

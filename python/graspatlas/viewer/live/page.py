@@ -17,6 +17,8 @@ __all__ = ["LivePage"]
 
 #: What stands in the page in place of the token, until it is sent.
 NO_TOKEN = "no-token-yet"
+#: The scripts of the buttons, after those of the page.
+SCRIPTS = ("asked", "added", "live")
 
 
 class LivePage:
@@ -33,14 +35,15 @@ class LivePage:
     def __init__(self, session: Session, chart: int | None = None) -> None:
         self.session = session
         files = resources.files("graspatlas.viewer.live")
-        read = lambda name: (files / name).read_text(encoding="utf-8")  # noqa: E731
         additions = Additions(
+            charts=session.charts,
+            layout=session.layout,
             facts=self._facts(),
-            controls=read("controls.html"),
-            style=read("style.css"),
-            scripts="\n".join(read(f"scripts/{name}.js") for name in ("asked", "added", "live")),
+            controls=(files / "controls.html").read_text(encoding="utf-8"),
+            style=(files / "style.css").read_text(encoding="utf-8"),
+            scripts="\n".join((files / "scripts" / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS),
         )
-        self._text = explorer_page(session.result, chart, session.charts, additions)
+        self._text = explorer_page(session.result, chart, additions)
 
     def _facts(self) -> PlainTable:
         return {
@@ -62,6 +65,6 @@ class LivePage:
     def ask(self, asked: StatedTable) -> PlainTable:
         """Begin a piece of work, or stop the one that runs."""
         if asked.get("action") == "stop":
-            self.session.jobs.stop()
-            return {"job": self.session.jobs.last and self.session.jobs.last.table()}
+            job = self.session.jobs.stop()
+            return {"job": job.table() if job else None}
         return {"job": begin(self.session, asked).table()}

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from graspatlas.analysis.climb import Climb
 from graspatlas.analysis.peaks import peaks_of
-from graspatlas.errors import GraspAtlasError
 from graspatlas.quality.batched import quality_name
 from graspatlas.result.refinement import Refinement
 from graspatlas.result.result import Result
@@ -53,7 +52,7 @@ def save(session: Session, whole: bool) -> str:
     return f"wrote {', '.join(written)} in {folder}{left}"
 
 
-def _arrays(session: Session) -> dict[str, np.ndarray]:
+def _arrays(session: Session) -> dict[str, Any]:
     """All grasps that have been added, one a row, and the indices at the grasps that the page opened with."""
     size = session.result.atlas.system.configuration_size
     added = session.added

@@ -24,6 +24,8 @@ __all__ = ["Watch", "serve", "watching"]
 
 #: Time that work which is asked to stop gets when the server ends [s].
 PATIENCE = 5.0
+#: The page of so many charts takes seconds to make.
+LARGE = 10_000
 
 
 def serve(
@@ -46,6 +48,8 @@ def serve(
     Raises:
         GraspAtlasError: If a mesh cannot be read, there is no such chart, or it cannot be served on this address.
     """
+    if result.atlas.n_charts > LARGE:
+        print(f"making the page of {result.atlas.n_charts:,} charts", file=sys.stderr)
     session = Session(result, file)
     server = PageServer(LivePage(session, chart), host)
     _announce(server, result.problem.name, open_browser)

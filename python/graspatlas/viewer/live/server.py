@@ -71,7 +71,9 @@ class PageServer:
         self.token = secrets.token_urlsafe(24)
         self._host = host
         self._http = _listening(host, port, self._handler())
-        self._thread = threading.Thread(target=self._http.serve_forever, args=(0.1,), name="graspatlas-live", daemon=True)
+        self._thread = threading.Thread(
+            target=self._http.serve_forever, args=(0.1,), name="graspatlas-live", daemon=True
+        )
         self._thread.start()
 
     @property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +12,10 @@ from graspatlas.simulation.outcome import Simulation
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import PlainTable
 from graspatlas.viewer.explorer.charts import MOST_MAXIMA, Charts
-from graspatlas.viewer.explorer.unrolled import unrolled
+from graspatlas.viewer.explorer.layout import Layout
 from graspatlas.viewer.explorer.words import index_tables
 from graspatlas.viewer.live.additions import Added, index_packed, packed, values_of
 from graspatlas.viewer.live.jobs import Jobs
-from graspatlas.viewer.scene.polygons import Coordinates, default_coordinates
 
 __all__ = ["Session"]
 
@@ -38,7 +36,7 @@ class Session:
 
     def __init__(self, result: Result, file: Path | None = None) -> None:
         self.result, self.file = result, file
-        self.charts = Charts(result)
+        self.charts, self.layout = Charts(result), Layout(result.atlas)
         self.jobs = Jobs()
         self.added: list[Added] = []
         self.others: dict[str, Array] = {}
@@ -64,16 +62,6 @@ class Session:
     def indices(self) -> list[str]:
         """Names of the page's indices."""
         return [*self.charts.indices, *self.others]
-
-    @cached_property
-    def coordinates(self) -> Coordinates:
-        """Where the page draws the grasps."""
-        return default_coordinates(self.result.atlas)
-
-    @cached_property
-    def unrolled(self) -> tuple[Array, Array]:
-        """Where the page draws the charts of a surface in the plane, and how each is turned there."""
-        return unrolled(self.result.atlas)
 
     def checked_grasp(self, number: object) -> int:
         """The number of a grasp that exists.
@@ -108,11 +96,11 @@ class Session:
         """
         if self.count - self.n_first + len(added) > MOST_ADDED:
             raise GraspAtlasError(
-                f"the page has {self.count - self.n_first} grasps besides the charts, and more than {MOST_ADDED} make it "
-                "slow: save them and open it again"
+                f"the page has {self.count - self.n_first} grasps besides the charts, and more than {MOST_ADDED} make "
+                "it slow: save them and open it again"
             )
         n_bits = len(self.charts.rejections[0])
-        places = self.coordinates.of(added.grasps.x)
+        places = self.layout.coordinates.of(added.grasps.x)
         table = packed(self.result, added, self.indices, n_bits, places)
         numbers = range(self.count, self.count + len(added))
         self.added.append(added)

@@ -22,9 +22,9 @@ class Live {
   }
 
   menus() {
-    byId("index").closest(".bar").append(byId("live-other"));
+    byId("index").closest(".bar").append(byId("live-index"));
     const left = facts.live.indices.filter((name) => !facts.indices.some((index) => index.name === name));
-    fill(byId("live-index"), ["choose\u2026", ...left.map((name) => name.replaceAll("_", " "))], 0, (i) => {
+    fill(byId("live-index"), ["another index\u2026", ...left.map((name) => name.replaceAll("_", " "))], 0, (i) => {
       if (i) this.ask({ action: "index", index: byId("live-index").options[i].text.replaceAll(" ", "_") });
       byId("live-index").selectedIndex = 0;
     });
@@ -87,7 +87,7 @@ class Live {
       this.enable(false);
       return;
     }
-    for (const one of state.news) await this.hear(one);
+    for (const one of state.news) await this.hear(one, first);
     this.known += state.news.length;
     byId("live-save").disabled = this.off("live-save") || !this.known;
     const { job } = state;
@@ -125,18 +125,18 @@ class Live {
     byId("live-progress").hidden = byId("live-stop").hidden = !running;
   }
 
-  async hear(news) {
+  async hear(news, first) {
     if (news.kind === "trial") {
       this.trials.set(news.grasp, [...(this.trials.get(news.grasp) || []), news.lines]);
       this.selection.tell("grasps");
       return;
     }
     const numbers = new Numbers(await inflated(bytesOf(news.data)), news.entries);
-    if (news.kind === "index") this.addIndex(news.index, numbers.get("values"));
+    if (news.kind === "index") this.addIndex(news.index, numbers.get("values"), !first);
     else this.addGrasps(news.grasps, numbers);
   }
 
-  addIndex(index, values) {
+  addIndex(index, values, chosen) {
     const { selection, atlas } = this, i = facts.indices.length;
     facts.indices.push(index);
     selection.columns.push(values);
@@ -144,6 +144,7 @@ class Live {
     for (const id of ["index", "other", "axis-0", "axis-1", "axis-2"]) offer(byId(id), index.label);
     const menu = byId("live-index");
     [...menu.options].find((option) => option.text === index.label)?.remove();
+    if (!chosen) return;
     byId("index").selectedIndex = i;
     selection.change({ index: i });
   }
