@@ -16,6 +16,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from socketserver import TCPServer
 from typing import Protocol
 from urllib.parse import parse_qs, urlsplit
 
@@ -157,6 +158,9 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _guarded(self, answer: Callable[[], None], token: bool) -> None:
         """Answer who may ask; errors go to the page in words."""
+        if not self.of.running:  # a connection that has stayed open
+            self.close_connection = True
+            return
         refusal = self._refusal(token)
         if refusal:
             self.close_connection = True
@@ -219,6 +223,11 @@ def _listening(host: str, port: int, handler: type[BaseHTTPRequestHandler]) -> T
             address_family = family
             daemon_threads = True
             allow_reuse_address = True
+
+            def server_bind(self) -> None:
+                """Without the look-up of the host's full name, for which one can wait long."""
+                TCPServer.server_bind(self)
+                self.server_name, self.server_port = host, int(self.server_address[1])
 
         try:
             return Server((str(place[0]), port), handler)

@@ -5,7 +5,7 @@ const LOOK_EVERY = 200; // milliseconds between two looks at work that goes on
 class Live {
   constructor(parts) {
     Object.assign(this, parts);
-    this.known = 0; // pieces of news
+    this.known = this.ended = 0; // pieces of news, and the number of the last job that has ended
     const wanted = location.hash; // before the page writes what it opens at
     this.trials = new Map();
     this.added = new AddedPoints(this.atlas, this.selection);
@@ -94,11 +94,12 @@ class Live {
     this.enable(Boolean(job && job.running), state.unsaved);
     if (!job || (first && !job.running)) return;
     this.tell(job);
-    if (job.running) this.timer = setTimeout(() => this.look(false), LOOK_EVERY);
-    else if (job.number === this.waited) {
-      this.waited = null;
-      if (job.show.length) this.selection.show(...job.show);
+    if (job.running) {
+      this.timer = setTimeout(() => this.look(false), LOOK_EVERY);
+      return;
     }
+    if (job.number === this.waited && job.show.length) this.selection.show(...job.show);
+    this.ended = job.number;
   }
 
   tell(job) {
