@@ -5,7 +5,12 @@ from __future__ import annotations
 import base64
 import http.client
 import json
+import re
+import signal
+import subprocess
+import sys
 import time
+import urllib.request
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -370,6 +375,38 @@ def test_an_atlas_is_watched_while_it_grows_and_is_the_same(result: ga.Result) -
     known = page.news(0, 0)["n_charts"]
     ga.optimize(result.problem, max_charts=20)
     assert page.news(0, 0)["n_charts"] == known, "after the block nobody looks"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there Ctrl-C is another thing")
+def test_optimize_watch_serves_the_result_until_ctrl_c(tmp_path: Path) -> None:
+    words = [
+        sys.executable,
+        "-m",
+        "graspatlas",
+        "optimize",
+        "planar_hand",
+        "--watch",
+        "--no-browser",
+        "--output",
+        "out",
+    ]
+    process = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert process.stderr is not None
+        line = process.stderr.readline()
+        found = re.search(r"http://127\.0\.0\.1:\d+/", line)
+        assert found, line
+        end = time.monotonic() + PATIENCE
+        while b'id="live-climb"' not in urllib.request.urlopen(found[0]).read():  # first that of the growth
+            assert time.monotonic() < end
+            time.sleep(0.1)
+        assert (tmp_path / "out" / "result.npz").exists()
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=PATIENCE)
+    finally:
+        process.kill()
+    assert process.returncode == 0
+    assert "planar_hand" in out
 
 
 # In a browser

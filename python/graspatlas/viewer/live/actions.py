@@ -96,6 +96,8 @@ def _do_climb(session: Session, number: int, free: bool, job: Job) -> str:
         if not more.n_steps:
             break
     status = _status(end)
+    if not end.n_steps:
+        return f"{end.quality:.4g}, no step leads higher: {status}"
     system = result.problem.full_system if free else result.system
     title = "End of a climb" + (", all motions free" if free else "")
     grasps = Grasps(result.problem, end.x, system, [chart])
