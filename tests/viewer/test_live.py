@@ -246,11 +246,15 @@ def test_wrong_requests_are_told_in_words(client: Client, result: ga.Result) -> 
 
 
 def test_a_start_that_meets_no_requirement_is_told(result: ga.Result, tmp_path: Path) -> None:
-    strict = ga.optimize(result.problem, require=[lambda grasp: grasp.object_xyz[0] > 1e9], atlas=result.atlas)
+    strict = ga.optimize(result.problem, require=[ga.ForceClosure(friction=0.1, margin=0.9)], atlas=result.atlas)
     session = Session(strict)
     client = Client(PageServer(LivePage(session), port=0), session)
     try:
-        job = client.done(action="climb", grasp=5)
+        status, told = client.ask(action="climb", grasp=5)
+        assert (status, "force closure" in told["error"]) == (400, True), told
+        client.done(action="densify", grasp=5)
+        assert not session.added[0].accepted.any()
+        job = client.done(action="climb", grasp=session.n_first)
         assert job["error"]
         assert "requirements" in job["text"]
         assert client.ask(action="save")[0] == 400, "it has no file"

@@ -24,6 +24,7 @@ from graspatlas.viewer.live.additions import Added
 from graspatlas.viewer.live.jobs import Job, Work
 from graspatlas.viewer.live.saving import save
 from graspatlas.viewer.live.session import Session
+from graspatlas.viewer.scene.captions import rejected_by
 
 __all__ = ["ACTIONS", "begin"]
 
@@ -81,6 +82,10 @@ def _do_index(session: Session, name: str, job: Job) -> str:
 def _climb(session: Session, asked: StatedTable) -> tuple[str, Work]:
     """A climb from a grasp."""
     number = session.checked_grasp(asked.get("grasp"))
+    result = session.result
+    if number < result.atlas.n_charts and not result.accepted[number]:
+        why = "; ".join(rejected_by(result.rejections(number)))
+        raise GraspAtlasError(f"a climb starts from a grasp that meets the requirements; chart {number}: {why}")
     free = bool(asked.get("all_motions")) or session.grasp(number)[2]
     return f"climb from {_named(session, number)}", partial(_do_climb, session, number, free)
 
