@@ -12,6 +12,7 @@ import sys
 import time
 import urllib.request
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ import pytest
 from browsing import browser
 
 import graspatlas as ga
+from graspatlas.atlas.growth import watched
 from graspatlas.quality.evaluation import evaluate
 from graspatlas.viewer.live.growth import GrowthPage
 from graspatlas.viewer.live.jobs import Job
@@ -196,8 +198,10 @@ def test_save_rewrites_the_result_only_on_request(client: Client, result: ga.Res
         assert arrays["sample"][1:].all()
     (climb,) = json.loads((folder / WORDS).read_text())["climbs"]
     assert climb["chart"] == 5
+    (folder / "summary.json").write_text("{}")
     assert not client.done(action="save", result=True)["error"]
     again = ga.load_result(folder)
+    assert json.loads((folder / "summary.json").read_text())["refined"]["quality"] == again.refined_best.quality
     assert again.refined_best.quality == pytest.approx(climb["quality"])
     assert np.array_equal(again.others["grasp_isotropy"], result.values("grasp_isotropy"))
     assert again.check().passed
@@ -369,6 +373,18 @@ def size(news: Any) -> int:
     return len(base64.b64decode(news["values"])) // 4
 
 
+def test_what_cannot_be_shown_does_not_end_the_growth(result: ga.Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("oh")
+
+    page = GrowthPage(result.problem, None)
+    monkeypatch.setattr(page, "_place", broken)
+    with watched(page.watch):
+        again = ga.optimize(result.problem)
+    assert np.array_equal(again.atlas.centers, result.atlas.centers)
+    assert "cannot be shown: oh" in str(page.news(0, 0)["phase"])
+
+
 def test_an_atlas_is_watched_while_it_grows_and_is_the_same(result: ga.Result) -> None:
     with watching(result.problem, open_browser=False) as watch:
         again = ga.optimize(result.problem)
@@ -379,6 +395,15 @@ def test_an_atlas_is_watched_while_it_grows_and_is_the_same(result: ga.Result) -
     known = page.news(0, 0)["n_charts"]
     ga.optimize(result.problem, max_charts=20)
     assert page.news(0, 0)["n_charts"] == known, "after the block nobody looks"
+
+
+@contextmanager
+def closing_at_end(process: subprocess.Popen[str]) -> Iterator[None]:
+    """A block after which a process does not go on, whatever has happened."""
+    try:
+        yield
+    finally:
+        process.kill()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there Ctrl-C is another thing")
@@ -395,7 +420,7 @@ def test_optimize_watch_serves_the_result_until_ctrl_c(tmp_path: Path) -> None:
         "out",
     ]
     process = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    try:
+    with process, closing_at_end(process):
         assert process.stderr is not None
         line = process.stderr.readline()
         found = re.search(r"http://127\.0\.0\.1:\d+/", line)
@@ -407,8 +432,6 @@ def test_optimize_watch_serves_the_result_until_ctrl_c(tmp_path: Path) -> None:
         assert (tmp_path / "out" / "result.npz").exists()
         process.send_signal(signal.SIGINT)
         out, _ = process.communicate(timeout=PATIENCE)
-    finally:
-        process.kill()
     assert process.returncode == 0
     assert "planar_hand" in out
 

@@ -52,19 +52,28 @@ class GrowthPage:
         self._images, self._places, self._values = np.zeros((0, 0)), np.zeros((0, 3)), np.zeros(0)
 
     def watch(self, system: AnySystem, builder: _core.AtlasBuilder) -> None:
-        """Look at an atlas between two slices of its growth; not at each."""
+        """Look at an atlas between two slices of its growth; not at each. What goes wrong here does not end it."""
         began = time.monotonic()
-        if began < self._next:
+        if began < self._next and not builder.audited:
             return
+        try:
+            self._look(system, builder)
+        except Exception as error:
+            self.phase = f"growing, but it cannot be shown: {error}"
+            self._next = float("inf")
+        else:
+            self._next = time.monotonic() + max(LOOK_EVERY, LOOK_SHARE * (time.monotonic() - began))
+
+    def _look(self, system: AnySystem, builder: _core.AtlasBuilder) -> None:
         if builder.n_charts < len(self._values):  # another one
             self._images, self._values = np.zeros((0, 0)), np.zeros(0)
         new = builder.arrays()["centers"][len(self._values) :]
         values = self._read(system, new)
         with self._lock:
-            self.phase = "checking for holes" if builder.complete else "growing"
+            self.phase = _phase(builder)
             self._n_open = builder.n_open
-            self._place(system, new, values)
-        self._next = time.monotonic() + max(LOOK_EVERY, LOOK_SHARE * (time.monotonic() - began))
+            if len(new):
+                self._place(system, new, values)
 
     def _place(self, system: AnySystem, new: Array, values: Array) -> None:
         """Give new charts their places; all of them where the axes are found anew."""
@@ -79,7 +88,7 @@ class GrowthPage:
             self._axes = np.zeros((3, self._images.shape[1]))
             self._axes[: len(directions)] = directions
             self._places = (self._images - self._middle) @ self._axes.T
-        elif len(images):
+        else:
             self._places = np.concatenate([self._places, (images - self._middle) @ self._axes.T])
 
     def _read(self, system: AnySystem, new: Array) -> Array:
@@ -126,6 +135,13 @@ class GrowthPage:
     def ask(self, asked: StatedTable) -> PlainTable:
         """Nothing can be asked for yet."""
         raise GraspAtlasError("the atlas is not done yet: wait for it")
+
+
+def _phase(builder: _core.AtlasBuilder) -> str:
+    """What is done."""
+    if builder.audited:
+        return "complete; reading the index and the requirements"
+    return "checking for holes" if builder.complete else "growing"
 
 
 def _text(numbers: Array) -> str:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,8 @@ __all__ = ["ARRAYS", "WORDS", "save"]
 
 #: Files of what has been found: arrays of all grasps, and climbs and trials in words.
 ARRAYS, WORDS = "explored.npz", "explored.json"
+#: What `optimize` writes beside its result.
+SUMMARY = "summary.json"
 
 
 def save(session: Session, whole: bool) -> str:
@@ -41,15 +45,22 @@ def save(session: Session, whole: bool) -> str:
     folder, written = session.file.parent, [ARRAYS, WORDS]
     with replaced(folder / ARRAYS) as stream:
         np.savez_compressed(stream, **_arrays(session))
-    with replaced(folder / WORDS) as stream:
-        stream.write((json.dumps(_words(session), indent=2) + "\n").encode("utf-8"))
+    _write(_words(session), folder / WORDS)
     left = ""
     if whole:
         result, left = _with_found(session)
         result.save(session.file)
         written.append(session.file.name)
+        if (folder / SUMMARY).exists():
+            _write(result.summary(), folder / SUMMARY)
+            written.append(SUMMARY)
     session.saved = known
     return f"wrote {', '.join(written)} in {folder}{left}"
+
+
+def _write(table: Mapping[str, object], path: Path) -> None:
+    with replaced(path) as stream:
+        stream.write((json.dumps(table, indent=2) + "\n").encode("utf-8"))
 
 
 def _arrays(session: Session) -> dict[str, Any]:

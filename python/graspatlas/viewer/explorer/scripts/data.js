@@ -52,6 +52,14 @@ class Rounded {
   }
 }
 
+// Two typed arrays one after the other, in the type of the first; they may be too long to be spread.
+function chained(first, second) {
+  const out = new first.constructor(first.length + second.length);
+  out.set(first);
+  out.set(second, first.length);
+  return out;
+}
+
 // Rows of columns, and after them further rows.
 class Stacked {
   constructor(first, second) {
@@ -67,7 +75,7 @@ class Stacked {
   }
 
   column(column) {
-    return Float64Array.of(...this.first.column(column), ...this.second.column(column));
+    return chained(this.first.column(column), this.second.column(column));
   }
 }
 

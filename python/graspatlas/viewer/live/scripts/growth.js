@@ -37,8 +37,8 @@ class Growth {
     if (epoch !== this.epoch) [this.places, this.values] = [new Float32Array(0), new Float32Array(0)];
     this.epoch = epoch;
     if (!more.length) return;
-    this.places = joined(this.places, more);
-    this.values = joined(this.values, moreValues);
+    this.places = chained(this.places, more);
+    this.values = chained(this.values, moreValues);
     this.known = this.places.length / 3;
     this.paint(index);
   }
@@ -65,13 +65,6 @@ class Growth {
     this.orbit.update(width / height);
     this.stage.renderer.render(this.scene, this.orbit.camera);
   }
-}
-
-function joined(first, second) {
-  const out = new Float32Array(first.length + second.length);
-  out.set(first);
-  out.set(second, first.length);
-  return out;
 }
 
 window.growth = new Growth(); // for whoever looks from the console

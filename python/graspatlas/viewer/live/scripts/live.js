@@ -56,7 +56,7 @@ class Live {
     const menu = byId("live-grasp"), before = this.choices || [];
     if (choices.join() === before.join()) return;
     const last = before[menu.selectedIndex], fresh = choices.filter((grasp) => !before.includes(grasp));
-    const chosen = fresh.length === 1 || !choices.includes(last) ? fresh[fresh.length > 1 ? 0 : fresh.length - 1] ?? choices[0] : last;
+    const chosen = fresh.length === 1 ? fresh[0] : choices.includes(last) ? last : choices[0];
     menu.replaceChildren();
     offer(menu, ...choices.map((grasp, i) => {
       const letter = selection.pins.length > 1 ? `${"AB"[i]}: ` : "";
@@ -156,9 +156,9 @@ class Live {
     selection.count = grasps.count = facts.n_charts + facts.maxima.length;
     grasps.numbers.append(numbers);
     selection.columns.forEach((column, i) => {
-      selection.columns[i] = Float64Array.of(...column, ...numbers.get(`index_${i}`));
+      selection.columns[i] = chained(column, numbers.get(`index_${i}`));
     });
-    selection.rejections = Uint32Array.of(...selection.rejections, ...numbers.get("rejections"));
+    selection.rejections = chained(selection.rejections, numbers.get("rejections"));
     atlas.extend();
   }
 
