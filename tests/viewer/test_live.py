@@ -224,6 +224,14 @@ def test_saved_climbs_join_those_of_a_refinement(result: ga.Result, tmp_path: Pa
     assert again.hits.sum() == refined.refinement.hits.sum() + 1
 
 
+def test_a_page_without_a_server_has_no_buttons(result: ga.Result, text: str, tmp_path: Path) -> None:
+    ga.export_html(result, tmp_path / "page.html")
+    alone = (tmp_path / "page.html").read_text(encoding="utf-8")
+    for word in ("live-climb", "connect-src", TOKEN_HEADER):
+        assert word not in alone
+        assert word in text
+
+
 # What is refused
 
 
