@@ -53,6 +53,7 @@ FLOORS = (
         "viewer.render",
         "viewer.web",
         "viewer.explorer",
+        "viewer.live",
         "viewer.figures",
         "viewer.notebook",
         "viewer",

@@ -349,3 +349,15 @@ def test_command_line(small_result: ga.Result, tmp_path: Path, capsys: pytest.Ca
     assert main(["densify", str(tmp_path), "0.1", "--share", "2"]) == 2
     assert capsys.readouterr().err.count("\n") == 2
     assert sorted(p.name for p in tmp_path.iterdir()) == ["result.npz", "samples.npz"]
+
+
+def test_chosen_charts_are_filled_as_all_of_them_are(planar_result: ga.Result) -> None:
+    spacing = 0.4 * planar_result.atlas.radius
+    everywhere, some = densify(planar_result, spacing), densify(planar_result, spacing, charts=[9, 4])
+    wanted = np.isin(everywhere.charts, [4, 9])
+    assert np.array_equal(some.x, everywhere.x[wanted])
+    assert np.array_equal(some.qualities, everywhere.qualities[wanted])
+    with pytest.raises(ga.GraspAtlasError, match="only one of share and charts"):
+        densify(planar_result, spacing, charts=[4], share=0.5)
+    with pytest.raises(ga.GraspAtlasError, match="chart 100000 does not exist"):
+        densify(planar_result, spacing, charts=[100_000])

@@ -288,6 +288,11 @@ def test_wrong_results(cli, small_result, tmp_path, damage):
     assert_one_line(cli("view", place, "--html", tmp_path / "page.html"), "result.npz")
 
 
+def test_options_that_do_not_go_together(cli, saved):
+    assert_one_line(cli("view", saved, "--alone"), "--meshcat")
+    assert_one_line(cli("optimize", "planar_hand", "--components", "--watch"), "--watch")
+
+
 def interrupt(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
     """Send Ctrl-C once the first progress has been printed."""
     process = subprocess.Popen(

@@ -57,11 +57,12 @@ def listening(pid: int) -> set[str]:
 
 
 @pytest.mark.skipif(not Path("/proc/self/net/tcp").exists(), reason="Linux lists sockets there")
+@pytest.mark.parametrize("also", [[], ["--meshcat"]], ids=["page", "meshcat"])
 def test_view_runs_nothing_of_the_current_folder_and_listens_on_loopback(
-    planted: Path, command: list[str], saved: Path, tmp_path: Path
+    planted: Path, command: list[str], saved: Path, tmp_path: Path, also: list[str]
 ) -> None:
     process = subprocess.Popen(
-        [*command, "view", str(saved), "--no-browser"], cwd=planted, stderr=subprocess.PIPE, text=True
+        [*command, "view", str(saved), "--no-browser", *also], cwd=planted, stderr=subprocess.PIPE, text=True
     )
     try:
         assert process.stderr is not None

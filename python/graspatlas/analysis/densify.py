@@ -12,6 +12,7 @@ How close the samples lie stands in :mod:`graspatlas.atlas.grid`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -75,7 +76,14 @@ class Samples(Grid):
 
 
 @stoppable()
-def densify(result: GraspAtlas, spacing: float, *, share: float = 1.0, progress: bool | None = None) -> Samples:
+def densify(
+    result: GraspAtlas,
+    spacing: float,
+    *,
+    share: float = 1.0,
+    charts: Sequence[int] | None = None,
+    progress: bool | None = None,
+) -> Samples:
     """Read the index on a denser grid: inside the polytopes, at a spacing of your choice.
 
     Everywhere, or where it promises most: see ``by_promise``. The charts are filled in that order, and Ctrl-C keeps
@@ -86,23 +94,28 @@ def densify(result: GraspAtlas, spacing: float, *, share: float = 1.0, progress:
         spacing: Distance between lattice points in a tangent space [rad, and lengths in units of
             ``problem.length_scale``]; at a fourth of the radius there are some thirty samples a chart when k = 2.
         share: Share of the charts to fill, those that promise most; above 0, and 1 for all.
+        charts: Fill only these charts, in this order, in place of a share of all.
         progress: Show a progress bar on standard error; by default when it is a terminal.
 
     Returns:
         The samples. Their best is at least as good as the best chart when all charts are filled.
 
     Raises:
-        GraspAtlasError: If an argument makes no sense, the grid would be too large, the index fails, or a requirement
-            is a function that a file did not keep.
+        GraspAtlasError: If an argument makes no sense, there is no such chart, the grid would be too large, the index
+            fails, or a requirement is a function that a file did not keep.
 
     Source: "Global Optimization of Robotic Grasps", end of Section IV.
     """
     check_is_result(result)
     positive(share, "share", most=1.0)
-    count = int(np.ceil(share * result.atlas.n_charts))
-    charts = by_promise(result)[:count]
+    if charts is None:
+        chosen = by_promise(result)[: int(np.ceil(share * result.atlas.n_charts))]
+    elif share != 1.0:
+        raise GraspAtlasError("give only one of share and charts")
+    else:
+        chosen = np.array([result.checked_chart(chart) for chart in charts], np.int64)
     done: list[tuple[Grid, Array, BoolArray, dict[str, int]]] = []
-    blocks = grid_blocks(result.atlas, spacing, charts, progress)
+    blocks = grid_blocks(result.atlas, spacing, chosen, progress)
     complete = True
     try:
         for block in blocks:

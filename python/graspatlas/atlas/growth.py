@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 from graspatlas import _core
 from graspatlas.atlas.checkpoints import CheckpointFolder
@@ -16,7 +18,7 @@ from graspatlas.support.interrupts import hear, held, stopping
 from graspatlas.support.progress import QUIET_SECONDS, is_shown, progress_bar
 from graspatlas.systems.system import AnySystem
 
-__all__ = ["Growth", "outlook"]
+__all__ = ["Growth", "Watcher", "outlook", "watched"]
 
 _SLICE_SECONDS = 0.1
 #: Work that a killed run can lose [s], but for the time that writing takes.
@@ -29,6 +31,20 @@ _COARSE_SHARE = 1 / 30
 
 #: Points of random walks that an audit looks up: at least, and as a share of the charts.
 AUDIT_POINTS, AUDIT_SHARE = 300, 1 / 20
+
+#: What looks at an atlas between two slices of its growth; it must leave the builder as it is.
+Watcher = Callable[[AnySystem, _core.AtlasBuilder], None]
+_watcher: ContextVar[Watcher | None] = ContextVar("watcher", default=None)
+
+
+@contextmanager
+def watched(watcher: Watcher) -> Iterator[None]:
+    """Let a function look at all atlases that grow within the block, in this thread."""
+    token = _watcher.set(watcher)
+    try:
+        yield
+    finally:
+        _watcher.reset(token)
 
 
 class Growth:
@@ -46,7 +62,7 @@ class Growth:
         radius: float,
         epsilon: float,
     ) -> None:
-        self.builder = builder
+        self.builder, self.system = builder, system
         self.audit_seconds = 0.0
         self._ratio = float(_COARSE_SHARE ** (-1 / system.dimension))
         self._coarse_arguments = (system, x0, self._ratio * radius, epsilon, builder.n_threads)
@@ -77,7 +93,7 @@ class Growth:
     def _run(self, limits: Limits, progress: bool | None, after_slice: Callable[[], None]) -> Status:
         shown = is_shown(progress)
         bar = progress_bar("atlas", "charts", progress=progress, initial=self.builder.n_charts)
-        builder, start = self.builder, time.perf_counter()
+        builder, start, watcher = self.builder, time.perf_counter(), _watcher.get()
         try:
             while not builder.audited:
                 now = time.perf_counter()
@@ -102,6 +118,8 @@ class Growth:
                     bar.note(outlook(builder, size, time.perf_counter() - start))
                 bar.update(builder.n_charts - bar.n)
                 after_slice()
+                if watcher is not None:
+                    watcher(self.system, builder)
         except KeyboardInterrupt:
             if shown:
                 print(f"interrupted: keeping {builder.n_charts} charts", file=sys.stderr)

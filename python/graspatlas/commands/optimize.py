@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from graspatlas.analysis.climb import MAX_STEPS
 from graspatlas.atlas.checkpoints import CheckpointFolder
@@ -17,12 +19,17 @@ from graspatlas.multistart.checkpoint import RoundFolder
 from graspatlas.multistart.search import SHARE
 from graspatlas.optimizer.components import Components, SearchStatus, find_components
 from graspatlas.optimizer.optimize import optimize
+from graspatlas.problem.problem import Problem
 from graspatlas.problems import load_problem
 from graspatlas.quality.evaluation import INDICES
 from graspatlas.requirements.named import parse_requirement
 from graspatlas.result.refinement import SearchEnd
+from graspatlas.result.result import Result
 from graspatlas.storage.files import replaced, writable_folder
 from graspatlas.support.terminal import say
+
+if TYPE_CHECKING:
+    from graspatlas.viewer.live.serve import Watch
 
 __all__ = ["add_commands"]
 
@@ -93,6 +100,12 @@ def add_commands(commands: Subcommands) -> None:
     )
     _add_limits(best)
     best.add_argument("--output", type=path_word, metavar="FOLDER", help="write result.npz and summary.json there")
+    best.add_argument(
+        "--watch",
+        action="store_true",
+        help="show in the browser how the atlas grows, and then the result as view does, until Ctrl-C",
+    )
+    best.add_argument("--no-browser", action="store_true", help="with --watch: do not open a browser, only say where")
     best.add_argument("--json", action="store_true", help="print one JSON object on standard output")
     best.set_defaults(run=_optimize)
 
@@ -130,13 +143,38 @@ def _optimize(options: argparse.Namespace) -> int:
     given = {name: getattr(options, name) for name in names}
     if options.components and options.motions == "all":
         raise GraspAtlasError("a search over all motions looks into all components: leave --components out")
+    if options.watch and options.components:
+        raise GraspAtlasError("--watch shows one atlas: leave --components out, and look at the result with view")
     if options.components:
         if options.workers is not None or options.scheduler is not None:
             raise GraspAtlasError("components are searched in this process: leave --workers and --scheduler out")
         return _report_components(find_components(problem, **given, require=require, progress=True), options, folder)
     checkpoint = folder / "checkpoint" if folder else None
     search = {name: getattr(options, name) for name in ("motions", "share_missing", "seed", "workers", "scheduler")}
-    result = optimize(problem, **given, **search, require=require, checkpoint=checkpoint, progress=True)
+    with _watched(options, problem) as watch:
+        result = optimize(problem, **given, **search, require=require, checkpoint=checkpoint, progress=True)
+        status = _report(result, options, folder)
+        if watch is not None:
+            watch.serve(result, folder / "result.npz" if folder else None)
+    return status
+
+
+@contextmanager
+def _watched(options: argparse.Namespace, problem: Problem) -> Iterator[Watch | None]:
+    """A block whose atlas is shown while it grows, where that is asked for."""
+    if not options.watch:
+        yield None
+        return
+    from graspatlas.viewer.live.serve import watching  # slow to import
+
+    names = options.quality or [problem.defaults.get("quality")]
+    index = names[0] if isinstance(names[0], str) else None
+    with watching(problem, index, open_browser=not options.no_browser) as watch:
+        yield watch
+
+
+def _report(result: Result, options: argparse.Namespace, folder: Path | None) -> int:
+    """Write and print a result; the exit status."""
     if folder:
         result.save(folder / "result.npz")
         _write_json(result.summary(), folder / "summary.json")

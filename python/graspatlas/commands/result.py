@@ -12,6 +12,7 @@ from graspatlas.execution.pregrasp import DISTANCE
 from graspatlas.formats.export import FORMATS, export_grasps
 from graspatlas.result.result import load_result
 from graspatlas.storage.columns import FRAME_ENDINGS, save_frame
+from graspatlas.storage.files import is_folder
 from graspatlas.support.terminal import say
 from graspatlas.support.validation import PlainTable
 
@@ -21,21 +22,26 @@ __all__ = ["add_commands"]
 def add_commands(commands: Subcommands) -> None:
     """Add view, export and check-result to the subcommands of a parser."""
     look = commands.add_parser(
-        "view", help="look at a result: its best grasp and another, or as a page its whole atlas"
+        "view", help="look at a result and work on it: its whole atlas beside the hand, in the browser"
     )
     look.add_argument("result", type=path_word, help="folder or file that optimize wrote")
     look.add_argument(
-        "--html", type=path_word, metavar="FILE", help="write a page of all grasps, which needs no server, instead"
+        "--html", type=path_word, metavar="FILE", help="write this page, which then needs no server and has no buttons"
     )
     look.add_argument(
         "--chart",
         metavar="CHART",
-        help="show this grasp beside the best, or open the page at it: a chart's number, first, best, worst or nearest",
+        help="open the page at this grasp, or show it beside the best: a chart's number, first, best, worst or nearest",
     )
     look.add_argument(
-        "--alone", action="store_true", help="without the worst beside the best, or the best beside a chart"
+        "--alone",
+        action="store_true",
+        help="with --meshcat or --picture: without the worst beside the best, or the best beside a chart",
     )
     look.add_argument("--picture", type=path_word, metavar="FILE", help="write a PNG picture instead")
+    look.add_argument(
+        "--meshcat", action="store_true", help="show the best grasp and another in meshcat, without the atlas, instead"
+    )
     look.add_argument("--no-browser", action="store_true", help="do not open a browser, only say where to look")
     look.add_argument(
         "--host",
@@ -74,6 +80,8 @@ def add_commands(commands: Subcommands) -> None:
 
 
 def _view(options: argparse.Namespace) -> int:
+    if options.alone and not (options.meshcat or options.picture):
+        raise GraspAtlasError("--alone is for --meshcat and --picture; the page shows the grasps that you pin")
     result = load_result(options.result)
     chart = None if options.chart is None else chart_named(result, options.chart)
     from graspatlas.viewer import export_html, save_picture, view  # slow to import
@@ -84,8 +92,15 @@ def _view(options: argparse.Namespace) -> int:
     if options.picture:
         save_picture(result, options.picture, chart=chart, worst=not options.alone)
         say(f"wrote {options.picture}", file=sys.stderr)
-    if not options.html and not options.picture:
-        view(result, open_browser=not options.no_browser, host=options.host, chart=chart, worst=not options.alone)
+    if options.html or options.picture:
+        return 0
+    shown = {"open_browser": not options.no_browser, "host": options.host, "chart": chart}
+    if options.meshcat:
+        view(result, worst=not options.alone, **shown)
+    else:
+        from graspatlas.viewer.live.serve import serve  # slow to import
+
+        serve(result, options.result / "result.npz" if is_folder(options.result) else options.result, **shown)
     return 0
 
 

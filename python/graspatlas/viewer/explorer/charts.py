@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, partial
 
 import numpy as np
@@ -42,24 +42,28 @@ class Charts:
 
     Args:
         result: The result.
+        batches: Other grasps of it in place of these.
     """
 
-    def __init__(self, result: GraspAtlas) -> None:
+    def __init__(self, result: GraspAtlas, batches: Sequence[Grasps] | None = None) -> None:
         self.result = result
         self.joints: list[Joint] = joint_tree(result.problem.hand)
-        self._batches = [Grasps(result.problem, result.atlas.centers, result.system)]
+        if batches is not None:
+            self.batches = list(batches)
+            return
+        self.batches = [Grasps(result.problem, result.atlas.centers, result.system)]
         if result.refinement:
             full = result.refinement.all_motions
             system = result.problem.full_system if full else result.system
-            self._batches.append(Grasps(result.problem, result.refinement.x[:MOST_MAXIMA], system))
+            self.batches.append(Grasps(result.problem, result.refinement.x[:MOST_MAXIMA], system))
 
     @property
     def n_maxima(self) -> int:
         """How many refined maxima stand after the charts."""
-        return sum(map(len, self._batches[1:]))
+        return sum(map(len, self.batches[1:]))
 
     def _of_all(self, read: Callable[[Grasps], AnyArray]) -> Array:
-        return np.concatenate([np.asarray(read(grasps), float) for grasps in self._batches])
+        return np.concatenate([np.asarray(read(grasps), float) for grasps in self.batches])
 
     @cached_property
     def indices(self) -> dict[str, Array]:
@@ -80,11 +84,11 @@ class Charts:
         result = self.result
         main = quality_name(result.quality)
         for name, values in ((main, result.qualities), *result.others.items()):
-            at_maxima = [np.full(len(grasps), np.nan) for grasps in self._batches[1:]]
+            at_maxima = [np.full(len(grasps), np.nan) for grasps in self.batches[1:]]
             if result.refinement and name == main:
                 at_maxima = [result.refinement.qualities[: self.n_maxima]]
             elif name in INDICES:
-                at_maxima = [evaluate(name, grasps) for grasps in self._batches[1:]]
+                at_maxima = [evaluate(name, grasps) for grasps in self.batches[1:]]
             yield name, np.concatenate([values, *at_maxima])
 
     @cached_property
@@ -113,22 +117,24 @@ class Charts:
 
     def write(self, numbers: Numbers) -> None:
         """Write all columns."""
+        self.write_postures(numbers)
+        numbers.add("rejections", self.rejections[1])
+        for i, values in enumerate(self.indices.values()):
+            numbers.add(f"index_{i}", _short(values, self.result.accepted))
+
+    def write_postures(self, numbers: Numbers) -> None:
+        """Write what is drawn of the grasps: joints, object, contacts, forces and ellipsoid."""
         numbers.add_rounded("positions", self._positions)
         numbers.add_rounded("object_xyz", self._of_all(lambda grasps: grasps.object_xyz))
         numbers.add_rounded("object_quat", self._of_all(lambda grasps: grasps.object_quat_xyzw))
         for name, column in zip(("contact_points", "contact_normals"), self._contacts(), strict=True):
             numbers.add_rounded(name, column)
-        axes, semi_axes = (
-            np.concatenate(parts) for parts in zip(*map(velocity_ellipsoids, self._batches), strict=True)
-        )
+        axes, semi_axes = (np.concatenate(parts) for parts in zip(*map(velocity_ellipsoids, self.batches), strict=True))
         numbers.add_rounded("ellipsoid_axes", axes[:, :, :2].swapaxes(1, 2).reshape(len(axes), 6))
         numbers.add_rounded("ellipsoid_lengths", semi_axes, log=True)
         numbers.add_rounded("semi_axes", self._of_all(lambda grasps: grasps.semi_axes), log=True)
-        forces = [self._forces(grasps) for grasps in self._batches]
+        forces = [self._forces(grasps) for grasps in self.batches]
         numbers.add_rounded("forces", np.concatenate([f.forces.reshape(len(f.forces), -1) for f in forces]))
-        numbers.add("rejections", self.rejections[1])
-        for i, values in enumerate(self.indices.values()):
-            numbers.add(f"index_{i}", _short(values, self.result.accepted))
 
     @cached_property
     def _positions(self) -> Array:

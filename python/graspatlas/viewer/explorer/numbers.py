@@ -9,6 +9,7 @@ from typing import TypedDict
 import numpy as np
 
 from graspatlas.support.arrays import AnyArray, Array
+from graspatlas.support.validation import PlainTable
 
 __all__ = ["Numbers"]
 
@@ -89,6 +90,10 @@ class Numbers:
         self.entries[name] = {"at": self._size, "type": TYPES[rows.dtype.name], "shape": shape}
         self._pieces.append(planes.tobytes())
         self._size += rows.nbytes
+
+    def table(self) -> PlainTable:
+        """All of them, and where each lies, as they are sent to a page that is there already."""
+        return {"entries": self.entries, "data": self.text()}  # type: ignore[dict-item]  # typed more closely
 
     def text(self) -> str:
         """All of them, deflated, in base64."""

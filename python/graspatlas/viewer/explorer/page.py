@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import html
 import json
+from dataclasses import dataclass
 from importlib import resources
 from string import Template
 
@@ -21,7 +22,7 @@ from graspatlas.result.grasp_atlas import GraspAtlas
 from graspatlas.support.arrays import Array
 from graspatlas.support.validation import PlainTable
 from graspatlas.viewer.explorer.charts import Charts
-from graspatlas.viewer.explorer.layout import write_layout
+from graspatlas.viewer.explorer.layout import Layout
 from graspatlas.viewer.explorer.numbers import Numbers
 from graspatlas.viewer.explorer.shapes import write_clash, write_shapes
 from graspatlas.viewer.explorer.words import index_tables, requirement_label
@@ -47,7 +48,7 @@ from graspatlas.viewer.scene.scene import (
 )
 from graspatlas.viewer.web.page import meshcat_script
 
-__all__ = ["explorer_page"]
+__all__ = ["Additions", "explorer_page"]
 
 #: The page's own scripts, in the order in which they stand in it.
 SCRIPTS = (
@@ -66,12 +67,34 @@ SCRIPTS = (
 )
 
 
-def explorer_page(result: GraspAtlas, chart: int | None = None) -> str:
+@dataclass(frozen=True)
+class Additions:
+    """What a page has besides, where a server answers it.
+
+    Attributes:
+        charts: The grasps of the page.
+        layout: Where it draws them.
+        facts: What its scripts know, as ``facts.live``.
+        controls: Markup below the buttons that copy.
+        style: Style sheet.
+        scripts: Scripts, in the scope of the page's own, after them.
+    """
+
+    charts: Charts
+    layout: Layout
+    facts: PlainTable
+    controls: str
+    style: str
+    scripts: str
+
+
+def explorer_page(result: GraspAtlas, chart: int | None = None, additions: Additions | None = None) -> str:
     """The page's text.
 
     Args:
         result: The result.
         chart: The chart that it opens at; by default it opens at the best grasp, the worst beside it.
+        additions: What the page has besides; with it, it may ask the server that it comes from.
 
     Raises:
         GraspAtlasError: If a mesh of the hand or the object cannot be read, or there is no such chart.
@@ -79,18 +102,24 @@ def explorer_page(result: GraspAtlas, chart: int | None = None) -> str:
     numbers = Numbers()
     nearest = None if result.refinement or result.nearest is None else int(result.nearest.chart)
     opens_at = nearest if chart is None else result.checked_chart(chart)
-    facts = _facts(result, numbers, opens_at)
+    charts, layout = (additions.charts, additions.layout) if additions else (Charts(result), Layout(result.atlas))
+    facts = _facts(charts, layout, numbers, opens_at)
     facts["opens_at"], facts["nearest"] = opens_at, nearest
     facts["numbers"] = numbers.entries  # type: ignore[assignment]  # plain data, but typed more closely
+    if additions:
+        facts["live"] = additions.facts
     files = resources.files("graspatlas.viewer.explorer")
     scripts = [(files / "scripts" / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS]
+    scripts += [additions.scripts] if additions else []
     template = Template((files / "page.html").read_text(encoding="utf-8"))
     return template.substitute(
         title=html.escape(f"graspatlas: {result.problem.name}"),
         name=html.escape(result.problem.name),
         summary=html.escape(subtitle(result).split(": ", 1)[1]),
         extremes=html.escape(_extremes(result)),
-        style=(files / "style.css").read_text(encoding="utf-8"),
+        style=(files / "style.css").read_text(encoding="utf-8") + (additions.style if additions else ""),
+        connect="; connect-src 'self'" if additions else "",
+        controls=additions.controls if additions else "",
         meshcat=meshcat_script(),
         facts=json.dumps(facts, allow_nan=False).replace("<", "\\u003c"),
         numbers=numbers.text(),
@@ -114,9 +143,9 @@ def _extremes(result: GraspAtlas) -> str:
     return f"{index_name(result)}: {values}"
 
 
-def _facts(result: GraspAtlas, numbers: Numbers, opens_at: int | None) -> PlainTable:
+def _facts(charts: Charts, layout: Layout, numbers: Numbers, opens_at: int | None) -> PlainTable:
     """What the page knows besides its numbers, which it writes; of the chart that it opens at also what it lacks."""
-    problem, charts = result.problem, Charts(result)
+    result, problem = charts.result, charts.result.problem
     shapes = BodyShapes(problem)
     rejected = () if opens_at is None else result.rejections(opens_at)
     clash = clash_of(rejected)
@@ -164,7 +193,7 @@ def _facts(result: GraspAtlas, numbers: Numbers, opens_at: int | None) -> PlainT
             "stripes": write_clash(clash, shapes, numbers, size * WIDTH) if clash else [],
             "point": clash.point.tolist() if clash and np.isfinite(clash.point).all() else None,
         },
-        "layout": write_layout(result.atlas, maxima, numbers),
+        "layout": layout.write(maxima, numbers),
         "view": _view(
             shapes, shown, size, None if clash is None or opens_at is None else (result.grasp(opens_at), clash)
         ),

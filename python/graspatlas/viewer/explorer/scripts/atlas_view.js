@@ -102,7 +102,7 @@ class AtlasView {
       if (maximum.all_motions) return; // it is not on this surface
       for (let c = 0; c < 3; c++)
         centers[3 * i + c] = flat
-          ? centers[3 * maximum.chart + c]
+          ? maximum.flat ? ((maximum.flat[c] ?? 0) - this.middle[c]) / this.size : centers[3 * maximum.chart + c]
           : (this.numbers.get("coordinates").get(i, c) - this.middle[c]) / this.size;
     });
     return centers;
@@ -150,13 +150,28 @@ class AtlasView {
     return out;
   }
 
-  buildPoints() {
-    const columns = this.axes.map((choice) => this.coordinates[choice][1]());
+  // The chosen coordinates of all grasps, as rows of three.
+  pointRows() {
     const rows = new Float32Array(3 * this.selection.count);
-    columns.forEach((column, c) => column.forEach((value, i) => { rows[3 * i + c] = Number.isFinite(value) ? value : NaN; }));
+    this.axes.map((choice) => this.coordinates[choice][1]()).forEach((column, c) =>
+      column.forEach((value, i) => { rows[3 * i + c] = Number.isFinite(value) ? value : NaN; }));
+    facts.maxima.forEach((maximum, m) => {
+      const i = 3 * (facts.n_charts + m);
+      if (maximum.all_motions) rows.fill(NaN, i, i + 3); // it is not among the charts
+    });
+    return rows;
+  }
+
+  // More grasps have come; what is seen stays where it is.
+  extend() {
+    if (this.mode !== "points") this.centers = this.centersOf(this.corners, this.mode === "flat");
+    else this.centers = this.pointRows().map((value, i) => (value - this.middle[i % 3]) / this.scales[i % 3]);
+    this.paint();
+  }
+
+  buildPoints() {
     const principal = this.axes.every((choice) => choice < 3);
-    this.centers = this.normalised(rows, 3, !principal);
-    facts.maxima.forEach((maximum, m) => { if (maximum.all_motions) this.centers.fill(NaN, 3 * (facts.n_charts + m)); });
+    this.centers = this.normalised(this.pointRows(), 3, !principal);
     const position = new THREE.BufferAttribute(this.centers.slice(0, 3 * facts.n_charts), 3);
     const colours = new THREE.BufferAttribute(new Uint8Array(3 * facts.n_charts), 3, true);
     const made = [1, 0.6].map((size) => {
@@ -214,6 +229,7 @@ class AtlasView {
     }
     if (this.faces) this.paintPolygons(colours);
     else this.paintPoints(colours);
+    if (this.added) this.added.paint();
     this.frame.material.color.set(pageColour("soft"));
     this.stage.request();
   }
@@ -329,6 +345,8 @@ class AtlasView {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (this.orbit.pointers.size > 1) return -1;
     this.orbit.update(width / height);
+    const added = this.added ? this.added.pick(x, y, width, height) : -1;
+    if (added >= 0) return added;
     return this.faces ? this.pickPolygon(x, y, width, height) : this.pickPoint(x, y, width, height);
   }
 
@@ -399,13 +417,4 @@ class AtlasView {
     }
     return found;
   }
-}
-
-// A white disc, for round points.
-function disc() {
-  const canvas = element("canvas", { width: 32, height: 32 }), context = canvas.getContext("2d");
-  context.fillStyle = "#fff";
-  context.arc(16, 16, 15, 0, 2 * Math.PI);
-  context.fill();
-  return new THREE.CanvasTexture(canvas);
 }

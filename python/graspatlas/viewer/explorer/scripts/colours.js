@@ -13,6 +13,16 @@ function viridis(share, out, at) {
   for (let c = 0; c < 3; c++) out[at + c] = VIRIDIS[i][c] + t * (VIRIDIS[i + 1][c] - VIRIDIS[i][c]);
 }
 
+// All of them from left to right, on a canvas of 256 pixels.
+function drawScale(canvas) {
+  const context = canvas.getContext("2d"), picture = context.createImageData(256, 1);
+  for (let i = 0; i < 256; i++) {
+    viridis(i / 255, picture.data, 4 * i);
+    picture.data[4 * i + 3] = 255;
+  }
+  context.putImageData(picture, 0, 0);
+}
+
 // A colour of the page by its name in the style sheet.
 function pageColour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
@@ -37,4 +47,13 @@ function startTheme(changed) {
   system.addEventListener("change", () => set(system.matches));
   byId("theme").addEventListener("click", () => set(root.dataset.theme !== "dark"));
   set(system.matches);
+}
+
+// A white disc, for round points.
+function disc() {
+  const canvas = element("canvas", { width: 32, height: 32 }), context = canvas.getContext("2d");
+  context.fillStyle = "#fff";
+  context.arc(16, 16, 15, 0, 2 * Math.PI);
+  context.fill();
+  return new THREE.CanvasTexture(canvas);
 }

@@ -52,9 +52,36 @@ class Rounded {
   }
 }
 
+// Two typed arrays one after the other, in the type of the first; they may be too long to be spread.
+function chained(first, second) {
+  const out = new first.constructor(first.length + second.length);
+  out.set(first);
+  out.set(second, first.length);
+  return out;
+}
+
+// Rows of columns, and after them further rows.
+class Stacked {
+  constructor(first, second) {
+    Object.assign(this, { first, second, rows: first.rows + second.rows, columns: first.columns });
+  }
+
+  get(row, column) {
+    return row < this.first.rows ? this.first.get(row, column) : this.second.get(row - this.first.rows, column);
+  }
+
+  row(row) {
+    return row < this.first.rows ? this.first.row(row) : this.second.row(row - this.first.rows);
+  }
+
+  column(column) {
+    return chained(this.first.column(column), this.second.column(column));
+  }
+}
+
 class Numbers {
-  constructor(bytes) {
-    this.bytes = bytes;
+  constructor(bytes, entries = facts.numbers) {
+    Object.assign(this, { bytes, entries });
     this.read = new Map();
   }
 
@@ -66,13 +93,21 @@ class Numbers {
   }
 
   has(name) {
-    return name in facts.numbers;
+    return name in this.entries;
   }
 
   // An array as it was written, or a Rounded.
   get(name) {
-    if (!this.read.has(name)) this.read.set(name, this.decoded(facts.numbers[name]));
+    if (!this.read.has(name)) this.read.set(name, this.decoded(this.entries[name]));
     return this.read.get(name);
+  }
+
+  // More grasps: further rows of the columns, in numbers that have been sent later.
+  append(more) {
+    for (const name of Object.keys(more.entries)) {
+      const rows = more.get(name);
+      if (rows instanceof Rounded) this.read.set(name, new Stacked(this.get(name), rows));
+    }
   }
 
   decoded(entry) {

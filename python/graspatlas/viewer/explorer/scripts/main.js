@@ -83,10 +83,11 @@ class Controls {
       const maxima = selection.graph.localMaxima(selection.values, selection.counts);
       go(maxima.length ? maxima[(maxima.indexOf(selection.focus) + 1) % maxima.length] : -1);
     });
-    byId("refined").hidden = !facts.maxima.length;
+    const refined = facts.maxima.length;
+    byId("refined").hidden = !refined;
     byId("refined").addEventListener("click", () => {
       const at = selection.focus - facts.n_charts;
-      go(facts.maxima.length ? facts.n_charts + ((Math.max(at, -1) + 1) % facts.maxima.length) : -1);
+      go(refined ? facts.n_charts + ((Math.max(at, -1) + 1) % refined) : -1);
     });
   }
 
@@ -97,19 +98,18 @@ class Controls {
     byId("scale-low").textContent = short(low);
     byId("scale-high").textContent = short(high);
     byId("scale-unit").textContent = [index.label, index.unit, selection.log ? "logarithmic" : ""].filter(Boolean).join(", ");
-    const context = byId("scale-bar").getContext("2d"), picture = context.createImageData(256, 1);
-    for (let i = 0; i < 256; i++) {
-      viridis(i / 255, picture.data, 4 * i);
-      picture.data[4 * i + 3] = 255;
-    }
-    context.putImageData(picture, 0, 0);
+    drawScale(byId("scale-bar"));
   }
 }
 
 function fill(select, names, chosen, changed) {
-  select.append(...names.map((name) => element("option", { textContent: name })));
+  offer(select, ...names);
   select.selectedIndex = chosen;
   select.addEventListener("change", () => changed(select.selectedIndex));
+}
+
+function offer(select, ...names) {
+  select.append(...names.map((name) => element("option", { textContent: name })));
 }
 
 function checkbox(text, checked, changed) {
@@ -250,18 +250,21 @@ async function start() {
   document.documentElement.dataset.theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
   const atlas = new AtlasView(numbers, selection), hand = new HandView(numbers, selection, grasps);
   const table = new NumbersTable(selection, hand);
-  new Controls(selection, atlas, hand);
+  const controls = new Controls(selection, atlas, hand);
   new Histogram(selection);
   const scatter = new Scatter(selection);
   const path = new PathPlayer(selection, grasps, atlas);
   new Keys(selection, atlas);
-  new Address(selection);
+  const address = new Address(selection);
   startTheme(() => selection.tell("view"));
-  window.graspatlas = { facts, selection, grasps, atlas, hand, table, path, scatter }; // for whoever looks from the console
+  const parts = { facts, selection, grasps, atlas, hand, table, path, scatter, controls, address };
+  window.graspatlas = parts; // for whoever looks from the console
   document.documentElement.dataset.ready = "yes";
+  return parts;
 }
 
-start().catch((error) => {
+const started = start();
+started.catch((error) => {
   document.querySelector("header p").textContent = `The page cannot be shown: ${error.message}`;
   throw error;
 });

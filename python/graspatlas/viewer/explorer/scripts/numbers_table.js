@@ -63,8 +63,14 @@ class NumbersTable {
         lines.push(element("p", { textContent: letter + countText(index.rule, read, selection.values[read.grasp]) }));
       }
     if (index.rule) lines.push(element("p", { textContent: drawnText(reads) }));
+    lines.push(...this.also(reads));
     if (this.hand.visible.force) lines.push(element("p", { textContent: forcesText(reads) }));
     return lines;
+  }
+
+  // What else is said of the grasps; a page that a server answers knows more.
+  also() {
+    return [];
   }
 
   // The grasps in the format of save_grasps, rounded as in this page.
@@ -88,7 +94,7 @@ class NumbersTable {
     const value = (i) => (Number.isFinite(selection.columns[i][grasp]) ? Number(selection.columns[i][grasp].toPrecision(8)) : null);
     return {
       chart: selection.chartOf(grasp),
-      refined: grasp >= facts.n_charts,
+      refined: grasp >= facts.n_charts && !facts.maxima[grasp - facts.n_charts].sample,
       accepted: selection.rejections[grasp] === 0,
       indices: Object.fromEntries(facts.indices.map(({ name }, i) => [name, value(i)])),
       joints: Object.fromEntries(facts.joints.map(({ name }, j) => [name, rounded(positions[j])])),

@@ -57,6 +57,14 @@ class Selection {
     }
   }
 
+  // Whether any grasp meets the requirements that are switched on, and its value is in the range.
+  allows(grasp) {
+    if (grasp < facts.n_charts) return this.inside[grasp] === 1;
+    const met = this.enabled.every((on, bit) => !on || !((this.rejections[grasp] >> bit) & 1));
+    const [low, high] = this.range || [-Infinity, Infinity], value = this.values[grasp];
+    return met && value >= low && value <= high;
+  }
+
   // The best chart (sign 1) or the worst (-1) by the index among those that count; -1 if none does.
   extreme(sign) {
     const { values, counts } = this;
@@ -151,7 +159,8 @@ class Selection {
   // What a grasp is called, and where it is.
   title(grasp) {
     if (grasp >= facts.n_charts) {
-      const { status, all_motions: free } = facts.maxima[grasp - facts.n_charts];
+      const { status, all_motions: free, title } = facts.maxima[grasp - facts.n_charts];
+      if (title) return [title, status];
       const first = grasp === facts.n_charts ? "Best grasp, refined" : `Refined maximum ${grasp - facts.n_charts + 1}`;
       return [first + (free ? ", all motions free" : ""), status === "maximum" ? "" : status];
     }
