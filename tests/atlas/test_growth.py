@@ -213,7 +213,7 @@ def test_steps_that_would_break_a_bound_are_foreseen() -> None:
 
 
 def test_a_chart_takes_two_jacobians() -> None:
-    """One above its centre, with which steps go down as far as they can, and one at its centre; the audit takes some."""
+    """One above its centre, with which steps go down as far as they can, and one there; the audit asks for some."""
 
     class Counted(PythonSphere):
         jacobians = 0
