@@ -201,3 +201,28 @@ def test_an_atlas_says_how_many_projections_it_took() -> None:
     assert fine.n_projections == fine.n_charts
     coarse = ga.build_atlas(Sphere(3), [0, 0, 1], radius=0.8, epsilon=0.1)
     assert coarse.n_projections > 2 * coarse.n_charts
+
+
+def test_steps_that_would_break_a_bound_are_foreseen() -> None:
+    """A cap of the 4-sphere in large charts, at whose rim steps of the full radius end outside."""
+    cap = PythonSphere(5, lower=[-np.inf] * 4 + [0.7])
+    atlas = ga.build_atlas(cap, [0, 0, 0, 0, 1], radius=0.5, epsilon=0.3)
+    assert atlas.status == "complete"
+    assert atlas.n_charts < atlas.n_projections < 2.5 * atlas.n_charts
+    assert atlas.centers[:, 4].min() < 0.72
+
+
+def test_a_chart_takes_two_jacobians() -> None:
+    """One above its centre, with which steps go down as far as they can, and one there; the audit asks for some."""
+
+    class Counted(PythonSphere):
+        jacobians = 0
+
+        def jacobian(self, x: np.ndarray) -> np.ndarray:
+            self.jacobians += 1
+            return super().jacobian(x)
+
+    system = Counted(3)
+    atlas = ga.build_atlas(system, [0, 0, 1], radius=0.1, epsilon=0.1)
+    assert np.abs(np.linalg.norm(atlas.centers, axis=1) - 1.0).max() < 1e-12
+    assert 2 * atlas.n_charts - 2 <= system.jacobians < 3 * atlas.n_charts

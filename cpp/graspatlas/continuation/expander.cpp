@@ -12,6 +12,8 @@ namespace {
 
 // The step alpha is multiplied by this after each failed attempt (Algorithm 1, line 11).
 constexpr double kShrink = 0.9;
+// Several such steps at once, which are foreseen to break a bound, may multiply it by this at least.
+constexpr double kMostShrink = 0.4;
 // A vertex is closed when alpha falls below this share of the radius.
 constexpr double kSmallestStep = 0.05;
 // Numbers in a block of lists of neighbours.
@@ -111,8 +113,9 @@ bool Expander::expand_vertex(int i, int vertex, ChartKey key) {
   const double norm = std::sqrt(squared_length(vertex_.data(), k_));
   for (int c = 0; c < k_; ++c) direction_[c] = vertex_[c] / norm;
 
+  const double shortest = kSmallestStep * options_.radius;
   Closed reason = Closed::open;
-  for (double alpha = options_.radius; alpha >= kSmallestStep * options_.radius; alpha *= kShrink) {
+  for (double alpha = options_.radius; alpha >= shortest;) {
     reason = attempt(i, direction_.data(), alpha);
     if (reason == Closed::open) {
       add_chart(key);
@@ -122,6 +125,10 @@ bool Expander::expand_vertex(int i, int vertex, ChartKey key) {
         if (std::equal(vertex_.begin(), vertex_.end(), polytope.vertex(u))) close(i, u, Closed::curvature);
       return true;
     }
+    const double longest = reason == Closed::bounds ? std::max(within_bounds(i, alpha), kMostShrink * alpha) : alpha;
+    // The last length is tried whatever is foreseen.
+    do alpha *= kShrink;
+    while (alpha > longest && alpha * kShrink >= shortest);
   }
   close(i, vertex, reason);
   return false;
@@ -130,6 +137,26 @@ bool Expander::expand_vertex(int i, int vertex, ChartKey key) {
 void Expander::close(int i, int vertex, Closed reason) {
   charts_[i].polytope.close(vertex, static_cast<std::uint8_t>(reason));
   charts_[i].closed = true;
+}
+
+// How far from the centre of chart i, along the step of length alpha that broke bounds, these are met: where the
+// parabola through a bound's slack at the centre, with its slope there, and at x_new_ falls below zero.
+double Expander::within_bounds(int i, double alpha) {
+  const RowMatrix& B = system_.bound_normals();
+  slacks_new_ = bounds_.slacks(x_new_.data());
+  const std::vector<double>& slacks = bounds_.slacks(charts_.center(i));
+  double longest = alpha;
+  for (std::size_t b = 0; b < slacks.size(); ++b) {
+    if (slacks_new_[b] >= 0.0) continue;
+    double along = 0.0;
+    for (int c = 0; c < n_; ++c) along += B(static_cast<Eigen::Index>(b), c) * step_[c];
+    const double slack = std::max(slacks[b], 0.0), slope = -along / alpha;
+    const double bend = ((slacks_new_[b] - slack) / alpha - slope) / alpha;
+    const double root = std::sqrt(std::max(slope * slope - 4.0 * bend * slack, 0.0));
+    const double met = slope > 0.0 ? -(slope + root) / (2.0 * bend) : slack > 0.0 ? 2.0 * slack / (root - slope) : 0.0;
+    longest = std::min(longest, met);
+  }
+  return longest;
 }
 
 // Projects a step of length alpha from chart i into x_new_, Phi_new_: eqs (14) to (18).

@@ -53,6 +53,7 @@ class Expander {
   std::int64_t list_bytes() const { return list_bytes_; }
 
  private:
+  double within_bounds(int i, double alpha);
   Closed attempt(int i, const double* direction, double alpha);
   bool expand_vertex(int i, int vertex, ChartKey key);
   void add_chart(ChartKey key);
@@ -79,6 +80,7 @@ class Expander {
   // Scratch: the candidate chart and its polytope, and work space of the tests.
   double residual_new_ = 0.0, regularity_new_ = 1.0;
   std::vector<double> x_new_, Phi_new_, step_, p_ij_, p_ji_, bound_in_chart_, direction_, vertex_, embedding_;
+  std::vector<double> slacks_new_;
   Polytope polytope_;
   Polytope::Scratch cut_scratch_;
   Neighbours::Scratch near_scratch_;

@@ -3,7 +3,9 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "graspatlas/manifold/tangent.hpp"
 #include "graspatlas/types.hpp"
 
 namespace graspatlas {
@@ -15,9 +17,14 @@ namespace {
 constexpr double kTolerance = 1e-12;
 // Steps after which a point has not converged. Newton's method takes 3 to 6 from within a chart's radius.
 constexpr int kMostIterations = 10;
-// As near the manifold as this the factorisation serves for the remaining steps, which converge at once, and for the
-// tangent basis [units of the tangent space].
-constexpr double kNearlyZero = 1e-7;
+// Steps go on with one factorisation while each is at most this share of the one before: then they cost less than new
+// factorisations, and converge.
+constexpr double kContraction = 0.05;
+// The same where few steps are left.
+constexpr double kFastContraction = 0.3;
+// A step that is foreseen only, from the two before it, is left out when it is shorter than what a projection may be
+// off by this factor.
+constexpr double kForeseen = 0.1;
 // Rounding of an equation beside the numbers in x, which no step can make smaller.
 constexpr double kRounding = 1e-14;
 // A Jacobian whose smallest singular value is this far below its largest has lost rank.
@@ -81,8 +88,7 @@ Newton::Newton(System& system)
       row_sizes_(system.equation_count()),
       inverse_sizes_(system.equation_count()),
       step_(system.tangent_size()),
-      tangents_(static_cast<std::size_t>(system.tangent_size()) * system.dimension()),
-      corrections_(tangents_.size()) {}
+      tangents_(static_cast<std::size_t>(system.tangent_size()) * system.dimension()) {}
 
 // R and J at x; the distance to zero.
 double Newton::linearize(const double* x) {
@@ -106,32 +112,50 @@ bool Newton::factorize(const double* Phi) {
 }
 
 Projection Newton::project(double* x, const double* Phi) {
-  bool nearly = false;  // the last factorisation was made nearly at the solution: it finishes the work
   double previous = HUGE_VAL;
   for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
     const double distance = linearize(x);
     if (!std::isfinite(distance)) return Projection::not_converged;
-    if (nearly && distance > 0.1 * previous) nearly = false;
-    if (!nearly && !factorize(Phi)) return Projection::singular;
-    if (distance <= tolerance(x)) return Projection::converged;
+    if (!factorize(Phi)) return Projection::singular;
+    const double enough = tolerance(x);
+    if (distance <= enough) return Projection::converged;
     if (iteration >= 2 && distance > 10.0 * previous) return Projection::not_converged;
     previous = distance;
-    nearly = nearly || distance <= kNearlyZero;
-    if (!std::isfinite(step_down(x))) return Projection::not_converged;
+    const double length = step_down(x);
+    if (!std::isfinite(length)) return Projection::not_converged;
+    descend(x, length, kForeseen * enough, kContraction);
   }
   return Projection::not_converged;
 }
 
-// A step from x with the residual and the factorisation that there are; its squared length. Where that is not finite x
-// stays.
-double Newton::step_down(double* x) {
+// The step with the residual and the factorisation that there are, into step_; its length.
+double Newton::solve_step() {
   for (std::size_t e = 0; e < R_.size(); ++e) step_[e] = -R_[e] * inverse_sizes_[e];
   std::fill(step_.begin() + static_cast<long>(R_.size()), step_.end(), 0.0);
   solver_.solve(step_.data());
-  double squared = 0.0;
-  for (const double s : step_) squared += s * s;
-  if (std::isfinite(squared)) system_.integrate(x, step_.data(), x);
-  return squared;
+  return std::sqrt(squared_length(step_.data(), system_.tangent_size()));
+}
+
+// That step from x; its length. Where that is not finite x stays.
+double Newton::step_down(double* x) {
+  const double length = solve_step();
+  if (std::isfinite(length)) system_.integrate(x, step_.data(), x);
+  return length;
+}
+
+// After a step of a length, more with the same factorisation, which ask for residuals only: true when the next would be
+// shorter than `enough`, false when one is a larger share than `contraction` of the one before. None is longer than
+// that.
+bool Newton::descend(double* x, double length, double enough, double contraction) {
+  for (int iteration = 0; iteration < kMostIterations && length > enough; ++iteration) {
+    system_.residual(x, R_.data());
+    const double previous = std::exchange(length, solve_step());
+    if (!(length < previous)) return false;
+    system_.integrate(x, step_.data(), x);
+    if (length > contraction * previous) return false;
+    if (length * length <= enough * previous) return true;
+  }
+  return length <= enough;
 }
 
 Projection Newton::project_nearly(double* x, const double* Phi, double enough) {
@@ -142,9 +166,9 @@ Projection Newton::project_nearly(double* x, const double* Phi, double enough) {
     if (iteration >= 2 && distance > 10.0 * previous) return Projection::not_converged;
     previous = distance;
     if (!factorize(Phi)) return Projection::singular;
-    const double squared = step_down(x);
-    if (!std::isfinite(squared)) return Projection::not_converged;
-    if (squared <= enough * enough) return Projection::converged;
+    const double length = step_down(x);
+    if (!std::isfinite(length)) return Projection::not_converged;
+    if (length <= enough || descend(x, length, kForeseen * enough, kFastContraction)) return Projection::converged;
   }
   return Projection::not_converged;
 }
@@ -192,24 +216,13 @@ bool Newton::approach(double* x) {
 
 bool Newton::tangent_basis(double* Phi) {
   const int n = system_.tangent_size(), k = system_.dimension(), equations = system_.equation_count();
-  // Columns of T solve [J; Phi'] T = [0; I]. The factorisation may be that of a point nearby, so one step of iterative
-  // refinement follows with the Jacobian here.
+  // Columns of T solve [J; Phi'] T = [0; I].
   double* T = tangents_.data();
-  double* correction = corrections_.data();
   std::fill(tangents_.begin(), tangents_.end(), 0.0);
   for (int i = 0; i < k; ++i) T[(equations + i) * k + i] = 1.0;
   solver_.solve(T, k);
-  std::fill(corrections_.begin(), corrections_.end(), 0.0);
-  for (int e = 0; e < equations; ++e)
-    for (int c = 0; c < n; ++c) {
-      const double slope = J_[static_cast<std::size_t>(e) * n + c];
-      for (int i = 0; i < k; ++i) correction[e * k + i] += slope * T[c * k + i];
-    }
-  for (int e = 0; e < equations; ++e)
-    for (int i = 0; i < k; ++i) correction[e * k + i] *= inverse_sizes_[e];
-  solver_.solve(correction, k);
   for (int i = 0; i < k; ++i)
-    for (int c = 0; c < n; ++c) Phi[i * n + c] = T[c * k + i] - correction[c * k + i];
+    for (int c = 0; c < n; ++c) Phi[i * n + c] = T[c * k + i];
   return orthonormalize(Phi, k, n);
 }
 

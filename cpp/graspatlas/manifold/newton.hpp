@@ -19,7 +19,8 @@ double distance_to_zero(const double* R, const double* J, int equations, int n, 
 ///
 /// Solves [J(x); Phi'] d = -[R(x); 0] and moves x <- x (+) d until R(x) = 0, so that x stays above its
 /// starting point. Rows are divided by their largest entries first: an equation may be multiplied by any number.
-/// The last factorisation is kept: it also gives the tangent basis at the point found.
+/// One factorisation serves for as many steps as it makes much shorter, which ask for R alone; the last is made at the
+/// point found, and gives the tangent basis there.
 class Newton {
  public:
   explicit Newton(System& system);
@@ -61,14 +62,16 @@ class Newton {
 
  private:
   double linearize(const double* x);
+  double solve_step();
   double step_down(double* x);
+  bool descend(double* x, double length, double enough, double contraction);
   bool factorize(const double* Phi);
   double tolerance(const double* x) const;
 
   System& system_;
   LinearSolver solver_;
   const std::vector<double>* scales_ = nullptr;
-  std::vector<double> R_, J_, row_sizes_, inverse_sizes_, step_, tangents_, corrections_;
+  std::vector<double> R_, J_, row_sizes_, inverse_sizes_, step_, tangents_;
   double residual_ = 0.0;
 };
 
