@@ -161,7 +161,7 @@ def test_view_shows_a_chart(
     monkeypatch.setattr("graspatlas.viewer.save_picture", lambda *a, **how: asked.append(how))
     monkeypatch.setattr("graspatlas.viewer.view", lambda *a, **how: asked.append(how))
     assert cli("view", tmp_path, "--picture", tmp_path / "a.png", "--chart", 3)[0] == 0
-    assert cli("view", tmp_path, "--chart", 3, "--alone")[0] == 0
+    assert cli("view", tmp_path, "--meshcat", "--chart", 3, "--alone")[0] == 0
     assert [(how["chart"], how["worst"]) for how in asked] == [(3, True), (3, False)]
     monkeypatch.undo()
     n = some_accepted.atlas.n_charts
