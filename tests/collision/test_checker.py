@@ -117,7 +117,7 @@ from oracles.collision_oracle import made_problem, touching_grasps
 from graspatlas.collision.checker import CollisionChecker
 made = made_problem(Path({folder!r}), "scbm" * 8, "c", "h")
 X, answers = touching_grasps(made, 300), set()
-for _ in range(100):
+for _ in range(50):
     answers.add(CollisionChecker(made).free(X).tobytes())
 (answer,) = answers
 print(sum(answer))
