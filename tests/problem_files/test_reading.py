@@ -397,6 +397,11 @@ def test_primitive_objects(text):
         np.testing.assert_allclose(box.max_ - box.min_, OBJECTS[text], rtol=1e-9)
 
 
+def test_a_scale_that_would_be_passed_over_is_refused():
+    said = fault(CAN.replace("urdf: objects/can.urdf", "sphere: {radius: 0.02}\n  scale: 0.001"))
+    assert "object: scale is for a mesh; state other sizes in metres" in said
+
+
 def test_an_object_of_a_mesh(tmp_path):
     (tmp_path / "parts").mkdir()
     corners = "".join(f"v {x} {y} {z}\n" for x in (0, 10) for y in (0, 20) for z in (0, 30))

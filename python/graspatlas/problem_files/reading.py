@@ -30,9 +30,9 @@ from graspatlas.problem_files.schema import (
     ContactTable,
     HandTable,
     MotionsTable,
-    ObjectTable,
     ObstacleTable,
     ProblemTable,
+    ShapedTable,
     SurroundingsTable,
 )
 from graspatlas.problem_files.schema_tables import Table
@@ -226,7 +226,7 @@ class _Reading:
         given = {"mjcf": path, "root": table.root, "name": table.name, "srdf": table.srdf}
         return Hand.from_dict({**given, "limits": table.limits}, self.folder)
 
-    def _object(self, table: ObjectTable | ObstacleTable) -> Body:
+    def _object(self, table: ShapedTable) -> Body:
         name = table.name
         if table.sphere is not None:
             return Body.sphere(name or "sphere", table.sphere.radius)
@@ -241,7 +241,7 @@ class _Reading:
         )
         return Body.from_dict(plain, self.folder)
 
-    def _mesh(self, mesh: str, table: ObjectTable | ObstacleTable) -> Body:
+    def _mesh(self, mesh: str, table: ShapedTable) -> Body:
         path = find_file(mesh, self.folder, tuple(table.package_paths)).resolve()
         return mesh_body(table.name or path.stem, path, 1.0 if table.scale is None else table.scale)
 

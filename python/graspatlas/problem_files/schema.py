@@ -112,8 +112,8 @@ class PoseGuessTable(Table):
     )
 
 
-class ObjectTable(BodyTable):
-    """The object."""
+class ShapedTable(BodyTable):
+    """A body that may be a mesh or a simple shape."""
 
     mesh: str | None = Field(
         None, description="Path of a mesh file (OBJ, STL, DAE), absolute or relative to this file."
@@ -124,6 +124,18 @@ class ObjectTable(BodyTable):
     sphere: SphereShape | None = Field(None, description="A sphere.")
     box: BoxShape | None = Field(None, description="A box.")
     cylinder: CylinderShape | None = Field(None, description="A cylinder along z.")
+
+    @model_validator(mode="after")
+    def _scale_of_mesh(self) -> ShapedTable:
+        if self.scale is not None and self.mesh is None:
+            message = "scale is for a mesh; state other sizes in metres"
+            raise PydanticCustomError("scale_of_shape", "{message}", {"message": message})
+        return self
+
+
+class ObjectTable(ShapedTable):
+    """The object."""
+
     joint: Literal["free_flyer", "planar"] = Field(
         "free_flyer", description="How it moves: in space, or in the palm's x-y plane."
     )
@@ -143,7 +155,7 @@ class PlaneShape(Table):
     normal: Vector = Field([0.0, 0.0, 1.0], description="Its normal, out of the obstacle.")
 
 
-class ObstacleTable(BodyTable):
+class ObstacleTable(ShapedTable):
     """A thing that the hand must not touch beside the object."""
 
     name: str = Field(description="Its name, such as table.")
@@ -153,22 +165,10 @@ class ObstacleTable(BodyTable):
     xyz: Vector = Field([0.0, 0.0, 0.0], description="Its position there [m]; a plane goes through it.")
     quat_xyzw: Quaternion = Field([0.0, 0.0, 0.0, 1.0], description="Its rotation; it is normalised.")
     plane: PlaneShape | None = Field(None, description="All that lies on the one side of a plane.")
-    mesh: str | None = Field(
-        None, description="Path of a mesh file (OBJ, STL, DAE), absolute or relative to this file."
-    )
-    scale: Positive | Scale | None = Field(
-        None, description="From the mesh's unit to metres, such as 0.001; 1 by default."
-    )
-    sphere: SphereShape | None = Field(None, description="A sphere.")
-    box: BoxShape | None = Field(None, description="A box.")
-    cylinder: CylinderShape | None = Field(None, description="A cylinder along z.")
 
     @model_validator(mode="after")
     def _one_source(self) -> ObstacleTable:
         exactly_one(self, ("plane", *OBJECT_SOURCES), "an obstacle")
-        if self.scale is not None and self.mesh is None:
-            message = "scale is for a mesh; state other sizes in metres"
-            raise PydanticCustomError("scale_of_shape", "{message}", {"message": message})
         return self
 
 
