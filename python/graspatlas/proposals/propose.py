@@ -120,8 +120,17 @@ def propose(
         check_workers("proposals on workers", workers, scheduler)
         looker, grower = LookOnWorkers(workers, scheduler), GrowOnWorkers(workers, scheduler)
     folder = writable_folder(output)
-    around = (tuple(obstacles), on_table)
-    setting = made_ready(named_hand(os.fspath(hand)), Path(mesh), scale, folder, fingers, links, *around, seed)
+    setting = made_ready(
+        named_hand(os.fspath(hand)),
+        Path(mesh),
+        folder,
+        scale=scale,
+        fingers=fingers,
+        links=links,
+        obstacles=tuple(obstacles),
+        on_table=on_table,
+        seed=seed,
+    )
     plan = Plan(
         setting.hand,
         setting.source,
@@ -135,14 +144,16 @@ def propose(
     kept = KeptLooks(folder / "looks", plan, setting.assignments)
     looked, grown = _schedule(start, deadline, top)
     with progress_bar("assignments", total=len(setting.assignments), progress=progress) as bar:
-        looks, end = looks_at(plan, setting.assignments, kept, looker, looked, deadline, bar)
+        looks, end = looks_at(plan, setting.assignments, kept, looker=looker, until=looked, deadline=deadline, bar=bar)
     tried = tuple(_tried(each, look) for each, look in zip(setting.assignments, looks, strict=False))
     results: dict[int, Result] = {}
     faults: list[str] = []
     if end is not ProposalsEnd.INTERRUPTED:
         best = best_looks(looks, top)
         with progress_bar("atlases", total=len(best), progress=progress) as bar:
-            results, faults, atlases_end = atlases_of(plan, setting.assignments, looks, best, grower, grown, bar)
+            results, faults, atlases_end = atlases_of(
+                plan, setting.assignments, looks, best, grower=grower, deadline=grown, bar=bar
+            )
         end = end if atlases_end is ProposalsEnd.COMPLETE else atlases_end
     proposals = [
         _written(plan, setting.assignments[i], Proposal(tried[i], result, folder / folder_name(i, tried[i].name)))

@@ -63,8 +63,9 @@ class Setting:
 def made_ready(
     named: NamedHand,
     mesh: Path,
-    scale: float | None,
     folder: Path,
+    *,
+    scale: float | None,
     fingers: int | None,
     links: Sequence[str] | None,
     obstacles: tuple[Obstacle, ...],
@@ -76,8 +77,8 @@ def made_ready(
     Args:
         named: The hand.
         mesh: Mesh file.
-        scale: From the mesh's unit to metres; None where it is metres, which is doubted where it looks like others.
         folder: Where ``object.urdf`` and ``hand.srdf`` are written.
+        scale: From the mesh's unit to metres; None where it is metres, which is doubted where it looks like others.
         fingers: How many fingertips touch; three by default, or all where there are fewer.
         links: Links that may touch; the fingertips by default.
         obstacles: What the hand must not touch beside the object.

@@ -114,7 +114,7 @@ class Result(GraspAtlas):
     def explore(self, chart: int | None = None, *, height: int = 640) -> EmbeddedPage:
         """The page of the whole atlas, with the hand beside it, in a notebook: as the output of a cell that ends in it.
 
-        It is the page that :func:`graspatlas.export_html` writes, within Jupyter, VS Code or Colab.
+        It is the page that :func:`graspatlas.export_html` writes, within a notebook.
 
         Args:
             chart: The chart at which it opens; by default the best grasp, the worst beside it.

@@ -29,8 +29,9 @@ class Displayed:
 class EmbeddedPage:
     """A page that a notebook shows where the cell that returns it has its output.
 
-    It needs neither server nor network, and works in Jupyter, VS Code and Colab. A notebook shows it once it is
-    trusted, as after its cells were run; :func:`graspatlas.export_html` writes the same page to a file.
+    It needs neither server nor network, and is meant for Jupyter and what shows cells as it does, as VS Code and Colab
+    do; it was tried in Chromium, and in none of these. A notebook shows it once it is trusted, as after its cells were
+    run; :func:`graspatlas.export_html` writes the same page to a file.
 
     Attributes:
         page: The text of the page.

@@ -54,6 +54,7 @@ def atlases_of(
     assignments: Sequence[Assignment],
     looks: Sequence[Look],
     best: Sequence[int],
+    *,
     grower: Grower,
     deadline: float,
     bar: ProgressBar,

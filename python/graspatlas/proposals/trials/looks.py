@@ -26,6 +26,7 @@ def looks_at(
     plan: Plan,
     assignments: Sequence[Assignment],
     kept: KeptLooks,
+    *,
     looker: Looker,
     until: float,
     deadline: float,
