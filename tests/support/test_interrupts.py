@@ -238,6 +238,23 @@ def test_a_press_in_the_middle_of_an_import_is_not_lost() -> None:
         work()
 
 
+def test_a_press_while_a_class_is_made() -> None:
+    """Python up to 3.11 makes a RuntimeError of what is raised where an attribute of a class learns its name."""
+
+    class Named:
+        def __set_name__(self, owner: type, name: str) -> None:
+            press()
+
+    @stoppable()
+    def work() -> None:
+        type("Owner", (), {"named": Named()})
+        for _ in range(5000):
+            time.sleep(0.001)
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+
+
 def test_inner_blocks_are_parts_of_the_outer_one() -> None:
     """What was asked to stop stays so, until the outermost block ends."""
     with stoppable():

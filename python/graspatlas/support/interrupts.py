@@ -157,9 +157,17 @@ def keeping(**kept: object) -> Iterator[None]:
 
 
 def _is_swallowing(frame: FrameType | None) -> bool:
-    """Whether a signal came into the callback by which imports give locks back: what that raises, Python ignores."""
+    """Whether a signal came where Python does not pass on what is raised.
+
+    It ignores what the callback raises by which imports give locks back, and makes a ``RuntimeError`` of what a
+    ``__set_name__`` raises while a class is made (before version 3.12).
+    """
     code = frame.f_code if frame else None
-    return code is not None and (code.co_name, code.co_filename) == ("cb", "<frozen importlib._bootstrap>")
+    if code is not None and (code.co_name, code.co_filename) == ("cb", "<frozen importlib._bootstrap>"):
+        return True
+    while frame is not None and frame.f_code.co_name != "__set_name__":
+        frame = frame.f_back
+    return frame is not None
 
 
 def _in_main_thread() -> bool:
