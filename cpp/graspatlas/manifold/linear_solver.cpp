@@ -1,157 +1,119 @@
 #include "graspatlas/manifold/linear_solver.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 namespace graspatlas {
 
 namespace {
-constexpr double kSingular = 1e-12;  // a pivot this small beside the largest entry means a singular matrix
-}
 
-LinearSolver::LinearSolver(int size)
-    : size_(size),
-      stride_((size + 1) / 2 * 2),
-      storage_(static_cast<std::size_t>(size) * stride_),
-      rows_(size),
-      origin_(size),
-      inverse_pivots_(size),
-      permuted_(size) {}
+// A pivot this small, in a matrix of entries of about one, means a singular matrix.
+constexpr double kSingular = 1e-13;
 
-bool LinearSolver::factorize() {
-  const int n = size_;
-  double largest = 0.0;
-  for (int i = 0; i < n; ++i) {
-    rows_[i] = row(i);
-    origin_[i] = i;
-    for (int j = 0; j < n; ++j) largest = std::max(largest, std::abs(rows_[i][j]));
-  }
-  determinant_negative_ = false;
-  const double threshold = kSingular * largest;
-  int c = 0;
-  // Two columns at a time: the rows below are read and written once for both.
-  for (; c + 1 < n; c += 2) {
-    if (!choose_pivot(c, threshold)) return false;
-    const double* __restrict first = rows_[c];
-    for (int i = c + 1; i < n; ++i) {
-      rows_[i][c] *= inverse_pivots_[c];
-      rows_[i][c + 1] -= rows_[i][c] * first[c + 1];
-    }
-    if (!choose_pivot(c + 1, threshold)) return false;
-    double* __restrict second = rows_[c + 1];
-    for (int j = c + 2; j < n; ++j) second[j] -= second[c] * first[j];
-    for (int i = c + 2; i < n; ++i) {
-      double* __restrict below = rows_[i];
-      const double factor = below[c], other = below[c + 1] * inverse_pivots_[c + 1];
-      below[c + 1] = other;
-      for (int j = c + 2; j < n; ++j) below[j] = below[j] - factor * first[j] - other * second[j];
-    }
-  }
-  return c == n || choose_pivot(c, threshold);
-}
+// Numbers that are taken at a time; arrays are as long as a multiple of that, and what is behind their ends is zero, or
+// does not matter.
+constexpr int kWidth = 4;
+using Numbers = Eigen::Array<double, kWidth, 1>;
 
-// Swaps the row with the largest number in column c into its place; false when that is too small.
-bool LinearSolver::choose_pivot(int c, double threshold) {
-  int pivot = c;
-  for (int i = c + 1; i < size_; ++i)
-    if (std::abs(rows_[i][c]) > std::abs(rows_[pivot][c])) pivot = i;
-  if (!(std::abs(rows_[pivot][c]) > threshold)) return false;
-  std::swap(rows_[c], rows_[pivot]);
-  std::swap(origin_[c], origin_[pivot]);
-  determinant_negative_ ^= (pivot != c) != (rows_[c][c] < 0.0);
-  inverse_pivots_[c] = 1.0 / rows_[c][c];
-  return true;
-}
+int padded(int size) { return (size + kWidth - 1) / kWidth * kWidth; }
 
-namespace {
-
-// Dot product in four running sums, which the processor adds up side by side.
-inline double dot(const double* __restrict a, const double* __restrict b, int n) {
-  double s0 = 0.0, s1 = 0.0, s2 = 0.0, s3 = 0.0;
-  int i = 0;
-  for (; i + 4 <= n; i += 4) {
-    s0 += a[i] * b[i];
-    s1 += a[i + 1] * b[i + 1];
-    s2 += a[i + 2] * b[i + 2];
-    s3 += a[i + 3] * b[i + 3];
-  }
-  for (; i < n; ++i) s0 += a[i] * b[i];
-  return (s0 + s1) + (s2 + s3);
+// a -= factor b
+inline void subtract(double* __restrict a, const double* __restrict b, double factor, int size) {
+  for (int i = 0; i < size; i += kWidth) Eigen::Map<Numbers>(a + i) -= factor * Eigen::Map<const Numbers>(b + i);
 }
 
 }  // namespace
 
-void LinearSolver::solve(double* b) const {
+LinearSolver::LinearSolver(int size)
+    : size_(size),
+      stride_(padded(size)),
+      storage_(static_cast<std::size_t>(size) * 2 * stride_),
+      by_pivot_(static_cast<std::size_t>(size) * stride_),
+      by_column_(static_cast<std::size_t>(size) * stride_),
+      rows_(size),
+      origin_(size),
+      inverse_pivots_(size),
+      work_(stride_),
+      steps_(stride_) {}
+
+bool LinearSolver::factorize() {
   const int n = size_;
-  permuted_.resize(n);
-  double* y = permuted_.data();
-  for (int i = 0; i < n; ++i) y[i] = b[origin_[i]] - dot(rows_[i], y, i);
-  for (int i = n - 1; i >= 0; --i) b[i] = (y[i] - dot(rows_[i] + i + 1, b + i + 1, n - i - 1)) * inverse_pivots_[i];
-}
-
-// A = P' L U: first U' z = b, then L' y = z; row by row, since rows are contiguous.
-void LinearSolver::solve_transposed(double* b) const {
-  const int n = size_;
-  permuted_.resize(n);
-  double* y = permuted_.data();
-  std::copy_n(b, n, y);
   for (int i = 0; i < n; ++i) {
-    const double* __restrict row = rows_[i];
-    y[i] *= inverse_pivots_[i];
-    for (int j = i + 1; j < n; ++j) y[j] -= y[i] * row[j];
+    rows_[i] = row(i);
+    origin_[i] = i;
   }
-  for (int i = n - 1; i > 0; --i) {
-    const double* __restrict row = rows_[i];
-    for (int j = 0; j < i; ++j) y[j] -= y[i] * row[j];
-  }
-  for (int i = 0; i < n; ++i) b[origin_[i]] = y[i];
-}
-
-void LinearSolver::solve(double* B, int columns) const {
-  permuted_.resize(static_cast<std::size_t>(size_) * columns);
-  switch (columns) {
-    case 1:
-      return solve_columns<1>(B, 1);
-    case 2:
-      return solve_columns<2>(B, 2);
-    case 3:
-      return solve_columns<3>(B, 3);
-    case 4:
-      return solve_columns<4>(B, 4);
-    default:
-      return solve_columns<0>(B, columns);
-  }
-}
-
-// Columns is their number where the compiler may know it, else 0.
-template <int Columns>
-void LinearSolver::solve_columns(double* B, int count) const {
-  const int n = size_, columns = Columns > 0 ? Columns : count;
-  double* Y = permuted_.data();
-  int first = n;  // of the rows of Y that are not zero
-  for (int i = 0; i < n; ++i) {
-    double* __restrict y = Y + static_cast<std::ptrdiff_t>(i) * columns;
-    const double* b = B + static_cast<std::ptrdiff_t>(origin_[i]) * columns;
-    std::copy_n(b, columns, y);
-    if (first == n && std::any_of(b, b + columns, [](double number) { return number != 0.0; })) first = i;
-    for (int j = first; j < i; ++j) {
-      const double factor = rows_[i][j];
-      const double* __restrict above = Y + static_cast<std::ptrdiff_t>(j) * columns;
-      for (int c = 0; c < columns; ++c) y[c] -= factor * above[c];
+  // To take the columns from the last to the first is to reverse them.
+  determinant_negative_ = n * (n - 1) / 2 % 2 != 0;
+  for (int t = 0; t < n; ++t) {
+    const int c = n - 1 - t;
+    if (!choose_pivot(t, c)) return false;
+    keep_pivot_row(t, c);
+    const double* const pivot_row = rows_[t];
+    double* const taken = factors_of_step(t);
+    std::fill_n(taken, stride_, 0.0);
+    for (int i = t + 1; i < n; ++i) {
+      double* const below = rows_[i];
+      const double factor = below[stride_ + t] = taken[origin_[i]] = below[c] * inverse_pivots_[t];
+      if (factor != 0.0) subtract(below, pivot_row, factor, c);
     }
   }
-  for (int i = n - 1; i >= 0; --i) {
-    const double* y = Y + static_cast<std::ptrdiff_t>(i) * columns;
-    double sums[Columns > 0 ? Columns : 1];
-    double* __restrict b = B + static_cast<std::ptrdiff_t>(i) * columns;
-    double* __restrict sum = Columns > 0 ? sums : b;
-    std::copy_n(y, columns, sum);
-    for (int j = i + 1; j < n; ++j) {
-      const double factor = rows_[i][j];
-      const double* __restrict below = B + static_cast<std::ptrdiff_t>(j) * columns;
-      for (int c = 0; c < columns; ++c) sum[c] -= factor * below[c];
+  return true;
+}
+
+// Swaps the row with the largest number in a column into the place of a step; false when that is too small.
+bool LinearSolver::choose_pivot(int step, int column) {
+  int pivot = step;
+  double largest = 0.0;
+  for (int i = step; i < size_; ++i) {
+    const double entry = std::abs(rows_[i][column]);
+    if (entry > largest) {
+      largest = entry;
+      pivot = i;
     }
-    for (int c = 0; c < columns; ++c) b[c] = sum[c] * inverse_pivots_[i];
+  }
+  if (!(largest > kSingular)) return false;
+  std::swap(rows_[step], rows_[pivot]);
+  std::swap(origin_[step], origin_[pivot]);
+  const double number = rows_[step][column];
+  determinant_negative_ ^= (pivot != step) != (number < 0.0);
+  inverse_pivots_[step] = 1.0 / number;
+  std::fill(factors(step) + step, factors(step) + padded(step), 0.0);
+  return true;
+}
+
+void LinearSolver::keep_pivot_row(int step, int column) {
+  const double* const row = rows_[step];
+  for (int c = 0; c < column; ++c) entries_of_column(c)[step] = row[c];
+}
+
+void LinearSolver::solve(double* b) {
+  const int n = size_;
+  double *const left = work_.data(), *const y = steps_.data();
+  std::copy_n(b, n, left);
+  for (int t = 0; t < n; ++t) {
+    y[t] = left[origin_[t]];
+    if (y[t] != 0.0) subtract(left, factors_of_step(t), y[t], n);
+  }
+  for (int c = 0, t = n - 1; c < n; ++c, --t) {
+    b[c] = y[t] * inverse_pivots_[t];
+    subtract(y, entries_of_column(c), b[c], t);
+  }
+}
+
+// With the rows U_t, by step, of what elimination left: A's row of step t is U_t plus the U_s before it times factors.
+// First the numbers w_t with sum_t w_t U_t = b, then y with sum_t y_t (row of step t) = b.
+void LinearSolver::solve_transposed(double* b) {
+  const int n = size_;
+  double *const w = steps_.data(), *const left = work_.data();
+  std::copy_n(b, n, left);
+  for (int t = 0, c = n - 1; t < n; ++t, --c) {
+    w[t] = left[c] * inverse_pivots_[t];
+    subtract(left, rows_[t], w[t], c);
+  }
+  for (int t = n - 1; t >= 0; --t) {
+    b[origin_[t]] = w[t];
+    subtract(w, factors(t), w[t], t);
   }
 }
 

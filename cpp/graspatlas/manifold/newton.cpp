@@ -29,6 +29,9 @@ constexpr double kForeseen = 0.1;
 constexpr double kRounding = 1e-14;
 // A Jacobian whose smallest singular value is this far below its largest has lost rank.
 constexpr double kRankTolerance = 1e-9;
+// Tangent vectors, which have no zeros, are made this much smaller than the equations' rows in the matrix to factorise:
+// then they become pivots last.
+constexpr double kTangentShare = 0.1;
 // Numbers of the inverse iteration are made smaller before they overflow.
 constexpr double kLargest = 1e100;
 // A tangent vector whose squared length is below this beside the ones before it depends on them.
@@ -87,8 +90,7 @@ Newton::Newton(System& system)
       J_(static_cast<std::size_t>(system.equation_count()) * system.tangent_size()),
       row_sizes_(system.equation_count()),
       inverse_sizes_(system.equation_count()),
-      step_(system.tangent_size()),
-      tangents_(static_cast<std::size_t>(system.tangent_size()) * system.dimension()) {}
+      step_(system.tangent_size()) {}
 
 // R and J at x; the distance to zero.
 double Newton::linearize(const double* x) {
@@ -107,7 +109,11 @@ bool Newton::factorize(const double* Phi) {
     double* const row = solver_.row(i);
     for (int c = 0; c < n; ++c) row[c] = inverse * from[c];
   }
-  for (int i = equations; i < n; ++i) std::copy_n(Phi + static_cast<std::size_t>(i - equations) * n, n, solver_.row(i));
+  for (int i = equations; i < n; ++i) {
+    const double* const from = Phi + static_cast<std::ptrdiff_t>(i - equations) * n;
+    double* const row = solver_.row(i);
+    for (int c = 0; c < n; ++c) row[c] = kTangentShare * from[c];
+  }
   return solver_.factorize();
 }
 
@@ -187,6 +193,7 @@ double Newton::regularity(int iterations) {
   const bool scaled = scales_ && !scales_->empty();
   const auto rescale = [&] {
     for (std::size_t e = 0; scaled && e < R_.size(); ++e) step_[e] *= (*scales_)[e] * inverse_sizes_[e];
+    for (std::size_t i = R_.size(); i < step_.size(); ++i) step_[i] *= kTangentShare;
   };
   for (int i = 0; i < iterations; ++i) {
     rescale();
@@ -214,15 +221,15 @@ bool Newton::approach(double* x) {
   return std::isfinite(step_down(x));
 }
 
+// Phi's row i solves [J; Phi'] d = [0; e_i], but for its length.
 bool Newton::tangent_basis(double* Phi) {
   const int n = system_.tangent_size(), k = system_.dimension(), equations = system_.equation_count();
-  // Columns of T solve [J; Phi'] T = [0; I].
-  double* T = tangents_.data();
-  std::fill(tangents_.begin(), tangents_.end(), 0.0);
-  for (int i = 0; i < k; ++i) T[(equations + i) * k + i] = 1.0;
-  solver_.solve(T, k);
-  for (int i = 0; i < k; ++i)
-    for (int c = 0; c < n; ++c) Phi[i * n + c] = T[c * k + i];
+  std::fill_n(Phi, static_cast<std::ptrdiff_t>(k) * n, 0.0);
+  for (int i = 0; i < k; ++i) {
+    double* const row = Phi + static_cast<std::ptrdiff_t>(i) * n;
+    row[equations + i] = kTangentShare;
+    solver_.solve(row);
+  }
   return orthonormalize(Phi, k, n);
 }
 

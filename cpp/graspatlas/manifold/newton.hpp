@@ -71,7 +71,7 @@ class Newton {
   System& system_;
   LinearSolver solver_;
   const std::vector<double>* scales_ = nullptr;
-  std::vector<double> R_, J_, row_sizes_, inverse_sizes_, step_, tangents_;
+  std::vector<double> R_, J_, row_sizes_, inverse_sizes_, step_;
   double residual_ = 0.0;
 };
 
