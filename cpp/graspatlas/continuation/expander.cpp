@@ -42,6 +42,8 @@ Expander::Expander(System& system, const AtlasOptions& options, Charts& charts)
       embedding_(system.embedding_size()),
       polytope_(k_, box_half_width(k_, options.radius), listed_vertices(k_)) {
   newton_.set_scales(&charts.scales());
+  const RowMatrix& B = system.bound_normals();
+  for (Eigen::Index b = 0; b < B.rows(); ++b) bound_reach_.push_back(std::sqrt(k_) * options.radius * B.row(b).norm());
 }
 
 void Expander::start(const double* x0) {
@@ -222,10 +224,11 @@ void Expander::cut_by_bounds(int j) {
   const RowMatrix& B = system_.bound_normals();
   const std::vector<double>& slacks = bounds_.slacks(charts_.center(j));
   for (int b = 0; b < system_.bound_count(); ++b) {
+    const double slack = std::max(slacks[static_cast<std::size_t>(b)], 0.0);
+    // The box reaches sqrt(k) r from the centre: a bound farther away cuts nothing, however the chart lies.
+    if (slack >= bound_reach_[static_cast<std::size_t>(b)]) continue;
     tangent_coordinates(charts_.basis(j), B.row(b).data(), k_, n_, bound_in_chart_.data());
     const double squared = squared_length(bound_in_chart_.data(), k_);
-    const double slack = std::max(slacks[static_cast<std::size_t>(b)], 0.0);
-    // The box reaches sqrt(k) r from the centre: a bound farther away cuts nothing.
     if (slack * slack >= squared * k_ * options_.radius * options_.radius) continue;
     const double norm = std::sqrt(squared);
     for (int a = 0; a < k_; ++a) bound_in_chart_[a] /= norm;

@@ -79,6 +79,7 @@ class Expander {
 
   // Scratch: the candidate chart and its polytope, and work space of the tests.
   double residual_new_ = 0.0, regularity_new_ = 1.0;
+  std::vector<double> bound_reach_;  // slack from which on a bound cuts no chart
   std::vector<double> x_new_, Phi_new_, step_, p_ij_, p_ji_, bound_in_chart_, direction_, vertex_, embedding_;
   std::vector<double> slacks_new_;
   Polytope polytope_;

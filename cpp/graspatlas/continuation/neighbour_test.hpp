@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -30,20 +31,42 @@ inline double project_displacement(const double* Phi, const double* d, int k, in
   return squared > 0.0 ? squared : 0.0;
 }
 
-/// Eq (18): true when the smallest singular value of Phi_i Phi_j' is at least `cosine` >= 0, that is when no
-/// direction of one tangent space makes a larger angle with the other than its arc cosine. `work` holds k x k
+/// What two bases [k x n] say about a displacement d and about each other, in one pass over their columns: p_i = Phi_i
+/// d, p_j = Phi_j d [k] and M = Phi_i Phi_j' [k x k]; returns |d|^2. K is k where the compiler may know it, else 0.
+template <int K>
+double compare_bases(const double* Phi_i, const double* Phi_j, const double* d, int k_, int n, double* p_i, double* p_j,
+                     double* M) {
+  const int k = K > 0 ? K : k_;
+  double squared = 0.0;
+  double sums_i[K > 0 ? K : 1], sums_j[K > 0 ? K : 1], products[K > 0 ? K * K : 1];
+  double *const to_i = K > 0 ? sums_i : p_i, *const to_j = K > 0 ? sums_j : p_j, *const to_M = K > 0 ? products : M;
+  std::fill_n(to_i, k, 0.0);
+  std::fill_n(to_j, k, 0.0);
+  std::fill_n(to_M, k * k, 0.0);
+  for (int c = 0; c < n; ++c) {
+    squared += d[c] * d[c];
+    for (int a = 0; a < k; ++a) {
+      const double on_i = Phi_i[a * n + c];
+      to_i[a] += on_i * d[c];
+      to_j[a] += Phi_j[a * n + c] * d[c];
+      for (int b = 0; b < k; ++b) to_M[a * k + b] += on_i * Phi_j[b * n + c];
+    }
+  }
+  if (K > 0) {
+    std::copy_n(to_i, k, p_i);
+    std::copy_n(to_j, k, p_j);
+    std::copy_n(to_M, k * k, M);
+  }
+  return squared;
+}
+
+/// Eq (18): true when the smallest singular value of M = Phi_i Phi_j' [k x k] is at least `cosine` >= 0, that is when
+/// no direction of one tangent space makes a larger angle with the other than its arc cosine. `work` holds k x k
 /// numbers.
 ///
 /// The test is that M M' - cosine^2 I has a Cholesky factor, which needs no singular values.
-inline bool tangent_spaces_agree(const double* Phi_i, const double* Phi_j, int k, int n, double cosine, double* work) {
-  double* M = work;
-  double* S = work + k * k;
-  for (int a = 0; a < k; ++a)
-    for (int b = 0; b < k; ++b) {
-      double dot = 0.0;
-      for (int c = 0; c < n; ++c) dot += Phi_i[a * n + c] * Phi_j[b * n + c];
-      M[a * k + b] = dot;
-    }
+inline bool tangent_spaces_agree(const double* M, int k, double cosine, double* work) {
+  double* S = work;
   for (int a = 0; a < k; ++a) {
     for (int b = 0; b <= a; ++b) {
       double sum = a == b ? -cosine * cosine : 0.0;
@@ -83,6 +106,7 @@ inline double squared_sheet_doubt(const double* p_i, const double* p_j, const do
 
 /// True when the determinant of M [k x k] is negative; M is overwritten.
 inline bool determinant_negative(double* M, int k) {
+  if (k == 2) return M[0] * M[3] < M[1] * M[2];
   bool negative = false;
   for (int c = 0; c < k; ++c) {
     int pivot = c;

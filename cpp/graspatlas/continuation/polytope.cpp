@@ -12,6 +12,7 @@ namespace graspatlas {
 
 namespace {
 
+constexpr int kMostDimensions = 12;
 // A vertex this little beyond a half-space (in units of offset + 1) is still inside it.
 constexpr double kOnPlane = 1e-12;
 
@@ -46,11 +47,19 @@ inline void list_bits(std::uint64_t bits, int count, std::uint16_t* out) {
   }
 }
 
+// Inserts a number into ascending ones.
+inline void insert(const std::uint16_t* ascending, int count, std::uint16_t number, std::uint16_t* out) {
+  int i = 0;
+  for (; i < count && ascending[i] < number; ++i) *out++ = ascending[i];
+  *out++ = number;
+  for (; i < count; ++i) *out++ = ascending[i];
+}
+
 }  // namespace
 
 Polytope::Polytope(int dimension, double half_width, Listed listed) : listed_(listed) {
-  if (dimension < 1 || dimension > 12)
-    throw Error("polytopes have 1 to 12 dimensions, not " + std::to_string(dimension));
+  if (dimension < 1 || dimension > kMostDimensions)
+    throw Error("polytopes have 1 to " + std::to_string(kMostDimensions) + " dimensions, not " + std::to_string(dimension));
   reset(dimension, half_width);
 }
 
@@ -185,7 +194,7 @@ bool Polytope::cut_in(const double* normal, double offset, int tag, Scratch& scr
   }
   if (inside_count == 0) return false;
   const int facet = new_facet(normal, offset, tag);
-  replace(find_new_vertices<K>(facet, scratch), scratch);
+  replace<K>(find_new_vertices<K>(facet, scratch), scratch);
   return true;
 }
 
@@ -195,8 +204,6 @@ int Polytope::find_new_vertices(int facet, Scratch& scratch) {
   const int k = K > 0 ? K : k_;
   const FacetIndex* rows = facets();
   const bool masks_hold = facet_count_ <= kMaskBits;
-  scratch.shared.resize(k);
-  FacetIndex* shared = scratch.shared.data();
   std::uint64_t* masks = scratch.masks.data();
   if (masks_hold) {
     for (int i = 0; i < vertex_count_; ++i) {
@@ -215,9 +222,14 @@ int Polytope::find_new_vertices(int facet, Scratch& scratch) {
     }
     scratch.inside_count = kept;
   }
+  // A vertex ends k edges.
+  const auto most = static_cast<std::size_t>(scratch.outside_count) * k;
+  scratch.vertices.resize(std::max(scratch.vertices.size(), most * k));
+  scratch.facets.resize(std::max(scratch.facets.size(), most * k));
+  double* vertex = scratch.vertices.data();
+  FacetIndex* vertex_facets = scratch.facets.data();
+  FacetIndex shared[kMostDimensions];
   int found = 0;
-  scratch.vertices.clear();
-  scratch.facets.clear();
   for (int o = 0; o < scratch.outside_count; ++o)
     for (int n = 0; n < scratch.inside_count; ++n) {
       const int out = scratch.outside[o], in = scratch.inside[n];
@@ -233,13 +245,9 @@ int Polytope::find_new_vertices(int facet, Scratch& scratch) {
           scratch.signed_distance[in] / (scratch.signed_distance[in] - scratch.signed_distance[out]);
       const double *a = vertices() + static_cast<std::ptrdiff_t>(in) * k,
                    *b = vertices() + static_cast<std::ptrdiff_t>(out) * k;
-      for (int c = 0; c < k; ++c) scratch.vertices.push_back(a[c] + fraction * (b[c] - a[c]));
-      // The facets of a vertex ascend.
-      const auto added = static_cast<FacetIndex>(facet);
-      int i = 0;
-      for (; i < k - 1 && shared[i] < added; ++i) scratch.facets.push_back(shared[i]);
-      scratch.facets.push_back(added);
-      for (; i < k - 1; ++i) scratch.facets.push_back(shared[i]);
+      for (int c = 0; c < k; ++c) *vertex++ = a[c] + fraction * (b[c] - a[c]);
+      insert(shared, k - 1, static_cast<FacetIndex>(facet), vertex_facets);
+      vertex_facets += k;
       ++found;
     }
   return found;
@@ -247,18 +255,28 @@ int Polytope::find_new_vertices(int facet, Scratch& scratch) {
 
 // Puts the new vertices into the places of the outside ones; what is left over goes to the end, or the end moves into
 // the gaps.
+template <int K>
 void Polytope::replace(int new_count, const Scratch& scratch) {
+  const int k = K > 0 ? K : k_;
   const int gone = scratch.outside_count;
   const int final_count = vertex_count_ - gone + new_count;
   if (final_count > vertex_capacity_) resize(final_count + 1 + final_count / 16, facet_capacity_);
+  double* const positions = vertices();
+  FacetIndex* const rows = facets();
+  std::uint8_t* const closed = states();
+  std::int32_t* const counts = uses();
   for (int o = 0; o < gone; ++o)
-    for (int c = 0; c < k_; ++c) --uses()[facets()[scratch.outside[o] * k_ + c]];
-  for (const FacetIndex f : scratch.facets) ++uses()[f];
-  for (int i = 0; i < new_count; ++i) {
+    for (int c = 0; c < k; ++c) --counts[rows[scratch.outside[o] * k + c]];
+  const double* vertex = scratch.vertices.data();
+  const FacetIndex* vertex_facets = scratch.facets.data();
+  for (int i = 0; i < new_count; ++i, vertex += k, vertex_facets += k) {
     const int place = i < gone ? scratch.outside[i] : vertex_count_ + i - gone;
-    std::copy_n(&scratch.vertices[static_cast<std::size_t>(i) * k_], k_, vertices() + place * k_);
-    std::copy_n(&scratch.facets[static_cast<std::size_t>(i) * k_], k_, facets() + place * k_);
-    states()[place] = 0;
+    for (int c = 0; c < k; ++c) {
+      positions[place * k + c] = vertex[c];
+      rows[place * k + c] = vertex_facets[c];
+      ++counts[vertex_facets[c]];
+    }
+    closed[place] = 0;
   }
   int last = vertex_count_ - 1, last_gone = gone - 1;
   for (int i = new_count; i < gone; ++i) {
@@ -268,9 +286,11 @@ void Polytope::replace(int new_count, const Scratch& scratch) {
       --last;
     }
     if (gap >= last) break;
-    std::copy_n(vertices() + last * k_, k_, vertices() + gap * k_);
-    std::copy_n(facets() + last * k_, k_, facets() + gap * k_);
-    states()[gap] = states()[last];
+    for (int c = 0; c < k; ++c) {
+      positions[gap * k + c] = positions[last * k + c];
+      rows[gap * k + c] = rows[last * k + c];
+    }
+    closed[gap] = closed[last];
     --last;
   }
   vertex_count_ = final_count;

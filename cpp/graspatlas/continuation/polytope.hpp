@@ -35,7 +35,7 @@ class Polytope {
   struct Scratch {
     std::vector<double> signed_distance, vertices;
     std::vector<std::uint64_t> masks;
-    std::vector<std::uint16_t> facets, shared;
+    std::vector<std::uint16_t> facets;
     std::vector<int> inside, outside;
     int inside_count = 0, outside_count = 0;
     // The outer vertices of one polytope, as long as that is of this version, and the offsets of its facets for them.
@@ -120,6 +120,7 @@ class Polytope {
   bool cut_in(const double* normal, double offset, int tag, Scratch& scratch);
   template <int K>
   int find_new_vertices(int facet, Scratch& scratch);
+  template <int K>
   void replace(int new_count, const Scratch& scratch);
 
   std::unique_ptr<std::byte[]> storage_;

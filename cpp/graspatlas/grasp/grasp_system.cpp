@@ -14,6 +14,7 @@ namespace graspatlas {
 namespace {
 
 constexpr int kEntries = ObjectJoint::kContactEntries;
+using Twist = Eigen::Matrix<double, 6, 1>;
 
 // A joint is moved by the kept motions when the row of its velocity is longer than this.
 constexpr double kMoved = 1e-12;
@@ -59,9 +60,7 @@ int embedding_size(const GraspParts& parts) {
   return size;
 }
 
-Matrix pseudo_inverse_transposed(const Matrix& A) {
-  return (A.transpose() * A).ldlt().solve(A.transpose()).transpose();
-}
+Matrix pseudo_inverse(const Matrix& A) { return (A.transpose() * A).ldlt().solve(A.transpose()); }
 
 }  // namespace
 
@@ -71,7 +70,7 @@ GraspSystem::GraspSystem(GraspParts parts)
       model_(std::move(parts.model)),
       contacts_(std::move(parts.contacts)),
       motions_(parts.motions),
-      motions_pseudo_inverse_t_(pseudo_inverse_transposed(parts.motions)),
+      motions_pseudo_inverse_(pseudo_inverse(parts.motions)),
       transmission_(parts.transmission),
       all_motions_(parts.motions.rows() == parts.motions.cols() && parts.motions.isIdentity(0.0)),
       motion_count_(static_cast<int>(parts.motions.cols())),
@@ -79,6 +78,7 @@ GraspSystem::GraspSystem(GraspParts parts)
       rows_per_contact_(object_joint_.equations_per_contact()),
       rows_(object_joint_.contact_rows()),
       length_scale_(parts.length_scale),
+      twists_(6 * static_cast<std::size_t>(motion_count_)),
       lower_limits_(std::move(parts.lower)),
       upper_limits_(std::move(parts.upper)) {
   check_parts();
@@ -110,8 +110,11 @@ void GraspSystem::check_parts() const {
 
 void GraspSystem::collect_free_parameters() {
   visit_sides(contacts_, [&](const ContactSide& side) {
-    if (side.u.free) free_parameters_.push_back({side.u, side.patch->u_unit()});
-    if (side.v.free) free_parameters_.push_back({side.v, side.patch->v_unit()});
+    const auto add = [&](const PatchParameter& parameter, ParameterUnit unit) {
+      if (parameter.free) free_parameters_.push_back({parameter, unit, parameter_scale(unit)});
+    };
+    add(side.u, side.patch->u_unit());
+    add(side.v, side.patch->v_unit());
   });
 }
 
@@ -137,7 +140,7 @@ void GraspSystem::add_parameter_bounds() {
   for (std::size_t i = 0; i < free_parameters_.size(); ++i) {
     const PatchParameter& parameter = free_parameters_[i].parameter;
     if (parameter.periodic) continue;
-    const double scale = parameter_scale(free_parameters_[i].unit);
+    const double scale = free_parameters_[i].scale;
     const auto add = [&](double sign, double limit, const char* side) {
       if (!std::isfinite(limit)) return;
       bounds_.push_back({model_->q_size() + static_cast<int>(i), static_cast<int>(i), false, sign, limit, scale});
@@ -204,30 +207,37 @@ void GraspSystem::residual(const double* x, double* R) {
   });
 }
 
-// Column of the model's tangent coordinate v in the rows of one contact, given the side's contact point.
-void GraspSystem::add_velocity_column(int v, double sign, const Eigen::Vector3d& point,
-                                      const Eigen::Vector3d& a_cross_m, const Eigen::Vector3d& b_cross_m,
-                                      double* J) const {
-  const double* velocity = model_->velocity(v);
+// Adds the column of what moves with a velocity, times a scale, to the rows of one contact, given its point.
+void GraspSystem::add_velocity_column(const double* velocity, double scale, const ContactArms& arms, double* J) const {
   const Eigen::Map<const Eigen::Vector3d> linear(velocity), angular(velocity + 3);
-  const Eigen::Vector3d moved = (sign / length_scale_) * (linear + angular.cross(point));
-  const double entries[kEntries] = {moved.x(), moved.y(), moved.z(), sign * angular.dot(a_cross_m),
-                                    sign * angular.dot(b_cross_m)};
-  const int n = tangent_size(), hand_v_size = model_->hand_v_size();
-  if (v < hand_v_size && !all_motions_) {
-    const double* motion = motions_.data() + static_cast<std::ptrdiff_t>(v) * motion_count_;
-    for (int e = 0; e < rows_per_contact_; ++e) {
-      double* __restrict row = J + static_cast<std::ptrdiff_t>(e) * n;
-      const double entry = entries[rows_[e]];
-      for (int c = 0; c < motion_count_; ++c) row[c] += entry * motion[c];
+  const Eigen::Vector3d moved = (scale / length_scale_) * (linear + angular.cross(arms.point));
+  const double entries[kEntries] = {moved.x(), moved.y(), moved.z(), scale * angular.dot(arms.a_cross_m),
+                                    scale * angular.dot(arms.b_cross_m)};
+  const int n = tangent_size();
+  for (int e = 0; e < rows_per_contact_; ++e) J[static_cast<std::ptrdiff_t>(e) * n] += entries[rows_[e]];
+}
+
+// Adds the columns of hand and object to the rows of one contact, for the side on a joint.
+void GraspSystem::add_velocity_columns(int joint, double sign, const ContactArms& arms, double* J) {
+  const int hand_v_size = model_->hand_v_size();
+  double* const twists = twists_.data();
+  bool moved = false;  // by hand motions, along each of which the joint moves with a twist
+  for (const int v : model_->support(joint)) {
+    const double* const velocity = model_->velocity(v);
+    if (v >= hand_v_size) {
+      const int object_v = v - hand_v_size;
+      add_velocity_column(velocity, sign * object_scale(object_v), arms, J + motion_count_ + object_v);
+    } else if (all_motions_) {
+      add_velocity_column(velocity, sign, arms, J + v);
+    } else {
+      if (!moved) std::fill(twists_.begin(), twists_.end(), 0.0);
+      moved = true;
+      const double* const motion = motions_.data() + static_cast<std::ptrdiff_t>(v) * motion_count_;
+      for (int c = 0; c < motion_count_; ++c)
+        Eigen::Map<Twist>(twists + 6 * c) += motion[c] * Eigen::Map<const Twist>(velocity);
     }
-    return;
   }
-  const int object_v = v - hand_v_size;
-  const int column = v < hand_v_size ? v : motion_count_ + object_v;
-  const double scale = object_v >= 0 ? object_scale(object_v) : 1.0;
-  for (int e = 0; e < rows_per_contact_; ++e)
-    J[static_cast<std::ptrdiff_t>(e) * n + column] += scale * entries[rows_[e]];
+  for (int c = 0; moved && c < motion_count_; ++c) add_velocity_column(twists + 6 * c, sign, arms, J + c);
 }
 
 void GraspSystem::write_column(const double* entries, double* J) const {
@@ -273,9 +283,8 @@ void GraspSystem::linearize(const double* x, double* R, double* J) {
     const ContactAxes axes = contact_axes(hand, object);
     write_equations(hand, object, axes, R);
     const Eigen::Vector3d a_cross_m = axes.a.cross(axes.m), b_cross_m = axes.b.cross(axes.m);
-    for (int v : model_->support(contact.hand.joint)) add_velocity_column(v, 1.0, hand.point, a_cross_m, b_cross_m, J);
-    for (int v : model_->support(contact.object.joint))
-      add_velocity_column(v, -1.0, object.point, a_cross_m, b_cross_m, J);
+    add_velocity_columns(contact.hand.joint, 1.0, {hand.point, a_cross_m, b_cross_m}, J);
+    add_velocity_columns(contact.object.joint, -1.0, {object.point, a_cross_m, b_cross_m}, J);
     column += write_parameter_columns(contact, hand, object, axes, J + column);
     J += static_cast<std::ptrdiff_t>(rows_per_contact_) * tangent_size();
   });

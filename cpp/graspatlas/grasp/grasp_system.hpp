@@ -117,6 +117,7 @@ class GraspSystem : public System {
   struct FreeParameter {
     PatchParameter parameter;
     ParameterUnit unit;
+    double scale;  // see parameter_scale
   };
   /// One side of a contact where it is.
   struct SideState {
@@ -127,6 +128,10 @@ class GraspSystem : public System {
   /// In the world: the object's normal, and the hand's tangents.
   struct ContactAxes {
     Eigen::Vector3d m, a, b;
+  };
+  /// What turns velocities into those of a contact's entries: the side's point, and hand tangents times the normal.
+  struct ContactArms {
+    const Eigen::Vector3d &point, &a_cross_m, &b_cross_m;
   };
   /// Derivatives of a patch's point, normal and tangents by one of its parameters, in the patch's frame.
   struct PatchDerivative {
@@ -147,8 +152,8 @@ class GraspSystem : public System {
   void place_side(const ContactSide& side, const double*& w, SideState& out) const;
   ContactAxes contact_axes(const SideState& hand, const SideState& object) const;
   void write_equations(const SideState& hand, const SideState& object, const ContactAxes& axes, double*& R) const;
-  void add_velocity_column(int v, double sign, const Eigen::Vector3d& point, const Eigen::Vector3d& a_cross_m,
-                           const Eigen::Vector3d& b_cross_m, double* J) const;
+  void add_velocity_column(const double* velocity, double scale, const ContactArms& arms, double* J) const;
+  void add_velocity_columns(int joint, double sign, const ContactArms& arms, double* J);
   int write_parameter_columns(const Contact& contact, const SideState& hand, const SideState& object,
                               const ContactAxes& axes, double* J) const;
   void write_hand_column(const SideState& hand, const ContactAxes& axes, const PatchDerivative& by, ParameterUnit unit,
@@ -156,6 +161,8 @@ class GraspSystem : public System {
   void write_object_column(const SideState& object, const ContactAxes& axes, const PatchDerivative& by,
                            ParameterUnit unit, double* J) const;
   void write_column(const double* entries, double* J) const;
+  void along_motions(const double* y, double* velocity) const;
+  void on_motions(const double* velocity, double* y) const;
 
   // How much a number of q or a parameter changes when its tangent coordinate changes by one.
   double object_scale(int i) const { return i < object_joint_.lengths() ? length_scale_ : 1.0; }
@@ -163,15 +170,16 @@ class GraspSystem : public System {
 
   std::shared_ptr<Model> model_;
   std::vector<Contact> contacts_;
-  RowMatrix motions_;                   // columns are the hand motions kept, in joint velocities
-  RowMatrix motions_pseudo_inverse_t_;  // its pseudo-inverse, transposed: joint velocities along the motions
-  RowMatrix transmission_;              // columns are the joint velocities that each actuated joint makes
+  RowMatrix motions_;                 // columns are the hand motions kept, in joint velocities
+  RowMatrix motions_pseudo_inverse_;  // joint velocities to those along the motions
+  RowMatrix transmission_;            // columns are the joint velocities that each actuated joint makes
   bool all_motions_;
   int motion_count_;
   ObjectJoint object_joint_;
   int rows_per_contact_;
   const int* rows_;  // of the entries of a contact, those that are equations
   double length_scale_;
+  std::vector<double> twists_;  // velocities of a joint along each motion kept [motion_count x 6]
   std::vector<double> lower_limits_, upper_limits_;
   std::vector<FreeParameter> free_parameters_;
   std::vector<Bound> bounds_;

@@ -27,25 +27,43 @@ class Velocity {
 
 }  // namespace
 
+// Joint velocities [hand_v_size] with velocities along the motions kept [motion_count].
+void GraspSystem::along_motions(const double* y, double* velocity) const {
+  const double* motion = motions_.data();
+  for (int i = 0; i < model_->hand_v_size(); ++i) {
+    double sum = 0.0;
+    for (int c = 0; c < motion_count_; ++c) sum += *motion++ * y[c];
+    velocity[i] = sum;
+  }
+}
+
+// Velocities along the motions kept of joint velocities, by least squares.
+void GraspSystem::on_motions(const double* velocity, double* y) const {
+  for (int c = 0; c < motion_count_; ++c) {
+    const double* const motion =
+        motions_pseudo_inverse_.data() + static_cast<std::ptrdiff_t>(c) * model_->hand_v_size();
+    double sum = 0.0;
+    for (int i = 0; i < model_->hand_v_size(); ++i) sum += motion[i] * velocity[i];
+    y[c] = sum;
+  }
+}
+
 void GraspSystem::integrate(const double* x, const double* v, double* out) const {
   const int hand_v_size = model_->hand_v_size();
   Velocity room(model_->v_size());
   double* const velocity = room.data();
-  for (int i = 0; i < hand_v_size; ++i) {
-    double sum = 0.0;
-    if (all_motions_)
-      sum = v[i];
-    else
-      for (int c = 0; c < motion_count_; ++c) sum += motions_(i, c) * v[c];
-    velocity[i] = sum;
-  }
+  if (all_motions_)
+    std::copy_n(v, hand_v_size, velocity);
+  else
+    along_motions(v, velocity);
   for (int i = 0; i < object_dof(); ++i) velocity[hand_v_size + i] = v[motion_count_ + i] * object_scale(i);
   model_->integrate(x, velocity, out);
   const double* v_w = v + motion_count_ + object_dof();
   for (int i = 0; i < parameter_count(); ++i) {
     const int at = model_->q_size() + i;
-    out[at] = x[at] + parameter_scale(free_parameters_[i].unit) * v_w[i];
-    if (free_parameters_[i].parameter.periodic) out[at] = wrap_angle(out[at]);
+    const FreeParameter& free = free_parameters_[static_cast<std::size_t>(i)];
+    out[at] = x[at] + free.scale * v_w[i];
+    if (free.parameter.periodic) out[at] = wrap_angle(out[at]);
   }
 }
 
@@ -54,27 +72,23 @@ void GraspSystem::difference(const double* x0, const double* x1, double* out) co
   double* const velocity = room.data();
   model_->difference(x0, x1, velocity);
   const int hand_v_size = model_->hand_v_size();
-  if (all_motions_) {
+  if (all_motions_)
     std::copy_n(velocity, hand_v_size, out);
-  } else {
-    std::fill_n(out, motion_count_, 0.0);
-    for (int i = 0; i < hand_v_size; ++i)
-      for (int c = 0; c < motion_count_; ++c) out[c] += motions_pseudo_inverse_t_(i, c) * velocity[i];
-  }
+  else
+    on_motions(velocity, out);
   for (int i = 0; i < object_dof(); ++i) out[motion_count_ + i] = velocity[hand_v_size + i] / object_scale(i);
   double* out_w = out + motion_count_ + object_dof();
   for (int i = 0; i < parameter_count(); ++i) {
     const int at = model_->q_size() + i;
+    const FreeParameter& free = free_parameters_[static_cast<std::size_t>(i)];
     const double d = x1[at] - x0[at];
-    out_w[i] = free_parameters_[i].parameter.periodic ? wrap_angle(d) : d / parameter_scale(free_parameters_[i].unit);
+    out_w[i] = free.parameter.periodic ? wrap_angle(d) : d / free.scale;
   }
 }
 
 void GraspSystem::embed(const double* x, double* out) const {
   if (model_->hand_is_euclidean()) {
-    std::fill_n(out, motion_count_, 0.0);
-    for (int i = 0; i < model_->hand_v_size(); ++i)
-      for (int c = 0; c < motion_count_; ++c) out[c] += motions_pseudo_inverse_t_(i, c) * x[i];
+    on_motions(x, out);
     out += motion_count_;
   } else {
     for (const JointInfo& joint : model_->hand_joints())
@@ -88,7 +102,7 @@ void GraspSystem::embed(const double* x, double* out) const {
       *out++ = std::cos(value);
       *out++ = std::sin(value);
     } else {
-      *out++ = value / parameter_scale(free_parameters_[i].unit);
+      *out++ = value / free_parameters_[i].scale;
     }
   }
 }

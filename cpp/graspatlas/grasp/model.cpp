@@ -2,6 +2,8 @@
 
 #include <console_bridge/console.h>
 
+#include <algorithm>
+#include <cmath>
 #include <mutex>
 #include <pinocchio/algorithm/jacobian.hpp>
 #include <pinocchio/algorithm/joint-configuration.hpp>
@@ -14,6 +16,11 @@
 namespace graspatlas {
 
 namespace {
+
+// A tree is taken for a model when at this many configurations its numbers differ from Pinocchio's by less [m, or
+// none].
+constexpr int kCompared = 3;
+constexpr double kSame = 1e-9;
 
 /// Pinocchio's joints for the object, and the spaces of their configurations.
 struct FreeFlyer {
@@ -93,6 +100,36 @@ void check_axes(const pinocchio::Model& model) {
         throw Error("joint '" + model.names[j] + "' of its URDF has no valid axis");
 }
 
+// The joints of a hand; none where one has other than one degree of freedom. A joint that neither turns nor slides, but
+// does both, is taken for one that turns.
+std::vector<AxisJoint> axis_joints(const pinocchio::Model& model, int joint_count) {
+  pinocchio::Data data(model);
+  pinocchio::computeJointJacobians(model, data, pinocchio::neutral(model));
+  std::vector<AxisJoint> joints;
+  for (pinocchio::JointIndex j = 1; j <= static_cast<pinocchio::JointIndex>(joint_count); ++j) {
+    if (model.nvs[j] != 1 || model.idx_vs[j] != static_cast<int>(j) - 1) return {};
+    const auto parent = model.parents[j];
+    const pinocchio::SE3 at_zero = data.oMi[parent].actInv(data.oMi[j]);
+    const Eigen::Vector3d linear = data.J.col(model.idx_vs[j]).head<3>(),
+                          angular = data.J.col(model.idx_vs[j]).tail<3>();
+    const bool turns = angular.norm() > 0.5;
+    joints.push_back({static_cast<int>(parent),
+                      turns,
+                      model.idx_qs[j],
+                      model.nqs[j] == 2,
+                      {at_zero.rotation(), at_zero.translation()},
+                      data.oMi[parent].rotation().transpose() * (turns ? angular : linear)});
+  }
+  return joints;
+}
+
+// Configurations far from each other, all joints turned by some part of a radian.
+Eigen::VectorXd some_configuration(const pinocchio::Model& model, int number) {
+  Eigen::VectorXd v(model.nv);
+  for (int i = 0; i < model.nv; ++i) v[i] = std::sin(1.0 + 2.0 * i + 5.0 * number);
+  return pinocchio::integrate(model, pinocchio::neutral(model), v);
+}
+
 }  // namespace
 
 struct Model::Pinocchio {
@@ -125,10 +162,34 @@ Model::Model(const std::string& urdf, const ObjectJoint& object)
   });
   pinocchio_->data = pinocchio::Data(model);
   placements_.resize(model.njoints);
+  velocities_.resize(6 * static_cast<std::size_t>(model.nv));
   supports_.resize(model.njoints);
   for (std::size_t j = 0; j < supports_.size(); ++j)
     for (const auto ancestor : model.supports[j])
       for (int v = 0; v < model.nvs[ancestor]; ++v) supports_[j].push_back(model.idx_vs[ancestor] + v);
+  make_tree();
+}
+
+// Takes the tree where it says what Pinocchio says.
+void Model::make_tree() {
+  const pinocchio::Model& model = pinocchio_->model;
+  const int hand_joints = static_cast<int>(hand_joints_.size());
+  const std::vector<AxisJoint> joints = axis_joints(model, hand_joints);
+  if (static_cast<int>(joints.size()) != hand_joints) return;
+  tree_ = JointTree(joints, object_joint_, hand_q_size_);
+  has_tree_ = true;
+  for (int number = 0; has_tree_ && number < kCompared; ++number) {
+    const Eigen::VectorXd q = some_configuration(model, number);
+    update(q.data(), true);
+    const std::vector<Placement> placements = placements_;
+    const std::vector<double> velocities = velocities_;
+    update_with_pinocchio(q.data(), true);
+    for (std::size_t j = 0; j < placements.size(); ++j)
+      has_tree_ = has_tree_ && (placements[j].rotation - placements_[j].rotation).norm() < kSame &&
+                  (placements[j].translation - placements_[j].translation).norm() < kSame;
+    for (std::size_t i = 0; i < velocities.size(); ++i)
+      has_tree_ = has_tree_ && std::abs(velocities[i] - velocities_[i]) < kSame;
+  }
 }
 
 Model::Model(const Model& other)
@@ -142,7 +203,10 @@ Model::Model(const Model& other)
       hand_joints_(other.hand_joints_),
       hand_frames_(other.hand_frames_),
       placements_(other.placements_),
-      supports_(other.supports_) {}
+      velocities_(other.velocities_),
+      supports_(other.supports_),
+      tree_(other.tree_),
+      has_tree_(other.has_tree_) {}
 
 Model::~Model() = default;
 
@@ -190,17 +254,22 @@ void Model::difference(const double* q0, const double* q1, double* out) const {
 }
 
 void Model::update(const double* q, bool jacobians) {
-  const Eigen::Map<const Eigen::VectorXd> q_map(q, q_size());
-  if (jacobians)
-    pinocchio::computeJointJacobians(pinocchio_->model, pinocchio_->data, q_map);
-  else
-    pinocchio::forwardKinematics(pinocchio_->model, pinocchio_->data, q_map);
-  for (std::size_t j = 0; j < placements_.size(); ++j) {
-    placements_[j].rotation = pinocchio_->data.oMi[j].rotation();
-    placements_[j].translation = pinocchio_->data.oMi[j].translation();
-  }
+  if (!has_tree_) return update_with_pinocchio(q, jacobians);
+  tree_.place(q, placements_.data());
+  if (jacobians) tree_.move(placements_.data(), velocities_.data());
 }
 
-const double* Model::velocity(int v) const { return pinocchio_->data.J.col(v).data(); }
+void Model::update_with_pinocchio(const double* q, bool jacobians) {
+  const Eigen::Map<const Eigen::VectorXd> q_map(q, q_size());
+  pinocchio::Data& data = pinocchio_->data;
+  if (jacobians) {
+    pinocchio::computeJointJacobians(pinocchio_->model, data, q_map);
+    std::copy_n(data.J.data(), velocities_.size(), velocities_.data());
+  } else {
+    pinocchio::forwardKinematics(pinocchio_->model, data, q_map);
+  }
+  for (std::size_t j = 0; j < placements_.size(); ++j)
+    placements_[j] = {data.oMi[j].rotation(), data.oMi[j].translation()};
+}
 
 }  // namespace graspatlas

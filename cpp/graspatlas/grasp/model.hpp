@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "graspatlas/grasp/joint_tree.hpp"
 #include "graspatlas/grasp/object_joint.hpp"
 #include "graspatlas/grasp/placement.hpp"
 
@@ -26,8 +27,9 @@ struct FrameInfo {
 
 /// Hand and object as one kinematic tree; q = [hand, object] in Pinocchio's conventions.
 ///
-/// Its source is the only file that includes Pinocchio. A model holds the results of its last `update`, so it
-/// must not be shared between threads: each takes a copy.
+/// Its source is the only file that includes Pinocchio, which defines what a model is. Where all joints of the hand
+/// have one degree of freedom a JointTree computes the same, which is checked when the model is made. A model holds the
+/// results of its last `update`, so it must not be shared between threads: each takes a copy.
 class Model {
  public:
   /// `urdf` is the text of the hand's URDF; its root is the world. Throws Error when it cannot be read.
@@ -61,7 +63,7 @@ class Model {
   const Placement& placement(int joint) const { return placements_[joint]; }
   /// Spatial velocity [linear at the world's origin, angular] of everything that tangent coordinate v
   /// carries.
-  const double* velocity(int v) const;
+  const double* velocity(int v) const { return &velocities_[6 * static_cast<std::size_t>(v)]; }
   /// Tangent coordinates that move a joint.
   const std::vector<int>& support(int joint) const { return supports_[joint]; }
 
@@ -75,7 +77,13 @@ class Model {
   std::vector<JointInfo> hand_joints_;
   std::vector<FrameInfo> hand_frames_;
   std::vector<Placement> placements_;
+  std::vector<double> velocities_;  // [v_size x 6]
   std::vector<std::vector<int>> supports_;
+  JointTree tree_;
+  bool has_tree_ = false;
+
+  void make_tree();
+  void update_with_pinocchio(const double* q, bool jacobians);
 };
 
 }  // namespace graspatlas

@@ -51,7 +51,7 @@ bool LinearSolver::factorize() {
     keep_pivot_row(t, c);
     const double* const pivot_row = rows_[t];
     double* const taken = factors_of_step(t);
-    std::fill_n(taken, stride_, 0.0);
+    for (int i = 0; i < n; i += kWidth) Eigen::Map<Numbers>(taken + i).setZero();
     for (int i = t + 1; i < n; ++i) {
       double* const below = rows_[i];
       const double factor = below[stride_ + t] = taken[origin_[i]] = below[c] * inverse_pivots_[t];

@@ -41,8 +41,8 @@ class LinearSolver {
   // Of each row what is left of it at its step, then the factors by which the pivots before were taken from it; and the
   // same by columns: the factors of each step by row, what is left in each column by step.
   std::vector<double> storage_, by_pivot_, by_column_;
-  std::vector<double*> rows_;    // in the order of their steps
-  std::vector<int> origin_;      // origin_[t]: index of the row whose pivot step t takes
+  std::vector<double*> rows_;  // in the order of their steps
+  std::vector<int> origin_;    // origin_[t]: index of the row whose pivot step t takes
   std::vector<double> inverse_pivots_;
   std::vector<double> work_, steps_;  // [stride]
 };
