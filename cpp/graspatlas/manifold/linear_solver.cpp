@@ -23,6 +23,14 @@ inline void subtract(double* __restrict a, const double* __restrict b, double fa
   for (int i = 0; i < size; i += kWidth) Eigen::Map<Numbers>(a + i) -= factor * Eigen::Map<const Numbers>(b + i);
 }
 
+inline void keep_largest(double entry, int i, double& largest, int& at) {
+  const double size = std::abs(entry);
+  if (size > largest) {
+    largest = size;
+    at = i;
+  }
+}
+
 }  // namespace
 
 LinearSolver::LinearSolver(int size)
@@ -45,45 +53,37 @@ bool LinearSolver::factorize() {
   }
   // To take the columns from the last to the first is to reverse them.
   determinant_negative_ = n * (n - 1) / 2 % 2 != 0;
+  int pivot = 0;
+  double largest = 0.0;
+  for (int i = 0; i < n; ++i) keep_largest(rows_[i][n - 1], i, largest, pivot);
   for (int t = 0; t < n; ++t) {
     const int c = n - 1 - t;
-    if (!choose_pivot(t, c)) return false;
-    keep_pivot_row(t, c);
+    if (!(largest > kSingular)) return false;
+    take_pivot(t, c, pivot);
     const double* const pivot_row = rows_[t];
+    const double inverse_pivot = inverse_pivots_[t];
     double* const taken = factors_of_step(t);
     for (int i = 0; i < n; i += kWidth) Eigen::Map<Numbers>(taken + i).setZero();
+    // The next pivot is sought in the same pass.
+    largest = 0.0;
     for (int i = t + 1; i < n; ++i) {
       double* const below = rows_[i];
-      const double factor = below[stride_ + t] = taken[origin_[i]] = below[c] * inverse_pivots_[t];
+      const double factor = below[stride_ + t] = taken[origin_[i]] = below[c] * inverse_pivot;
       if (factor != 0.0) subtract(below, pivot_row, factor, c);
+      keep_largest(below[c - 1], i, largest, pivot);
     }
   }
   return true;
 }
 
-// Swaps the row with the largest number in a column into the place of a step; false when that is too small.
-bool LinearSolver::choose_pivot(int step, int column) {
-  int pivot = step;
-  double largest = 0.0;
-  for (int i = step; i < size_; ++i) {
-    const double entry = std::abs(rows_[i][column]);
-    if (entry > largest) {
-      largest = entry;
-      pivot = i;
-    }
-  }
-  if (!(largest > kSingular)) return false;
+// Swaps a row into the place of its step.
+void LinearSolver::take_pivot(int step, int column, int pivot) {
   std::swap(rows_[step], rows_[pivot]);
   std::swap(origin_[step], origin_[pivot]);
-  const double number = rows_[step][column];
-  determinant_negative_ ^= (pivot != step) != (number < 0.0);
-  inverse_pivots_[step] = 1.0 / number;
-  std::fill(factors(step) + step, factors(step) + padded(step), 0.0);
-  return true;
-}
-
-void LinearSolver::keep_pivot_row(int step, int column) {
   const double* const row = rows_[step];
+  determinant_negative_ ^= (pivot != step) != (row[column] < 0.0);
+  inverse_pivots_[step] = 1.0 / row[column];
+  std::fill(factors(step) + step, factors(step) + padded(step), 0.0);
   for (int c = 0; c < column; ++c) entries_of_column(c)[step] = row[c];
 }
 

@@ -30,8 +30,7 @@ class LinearSolver {
   bool determinant_negative() const { return determinant_negative_; }
 
  private:
-  bool choose_pivot(int step, int column);
-  void keep_pivot_row(int step, int column);
+  void take_pivot(int step, int column, int pivot);
   double* factors(int step) { return rows_[step] + stride_; }
   double* factors_of_step(int step) { return &by_pivot_[static_cast<std::size_t>(step) * stride_]; }
   double* entries_of_column(int column) { return &by_column_[static_cast<std::size_t>(column) * stride_]; }
