@@ -59,7 +59,8 @@ inline void insert(const std::uint16_t* ascending, int count, std::uint16_t numb
 
 Polytope::Polytope(int dimension, double half_width, Listed listed) : listed_(listed) {
   if (dimension < 1 || dimension > kMostDimensions)
-    throw Error("polytopes have 1 to " + std::to_string(kMostDimensions) + " dimensions, not " + std::to_string(dimension));
+    throw Error("polytopes have 1 to " + std::to_string(kMostDimensions) + " dimensions, not " +
+                std::to_string(dimension));
   reset(dimension, half_width);
 }
 

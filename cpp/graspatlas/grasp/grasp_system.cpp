@@ -82,6 +82,10 @@ GraspSystem::GraspSystem(GraspParts parts)
       lower_limits_(std::move(parts.lower)),
       upper_limits_(std::move(parts.upper)) {
   check_parts();
+  std::vector<int> joints;
+  visit_sides(contacts_, [&](const ContactSide& side) { joints.push_back(side.joint); });
+  if (model_->object_joint_index() >= 0) joints.push_back(model_->object_joint_index());
+  placed_ = model_->carriers(joints);
   collect_free_parameters();
   add_joint_bounds();
   add_parameter_bounds();
@@ -168,7 +172,7 @@ RowMatrix GraspSystem::normals_of_bounds() const {
 // visit(contact, hand, object) for each contact, with both sides where they are.
 template <class Visit>
 void GraspSystem::visit_contacts(const double* x, bool velocities, Visit visit) {
-  model_->update(x, velocities);
+  model_->update(x, velocities, placed_);
   const double* w = x + model_->q_size();
   SideState hand, object;
   for (const Contact& contact : contacts_) {

@@ -80,6 +80,7 @@ class GraspSystem : public System {
   /// Two grasps may differ in hand motions that are frozen, of which differences say nothing.
   bool same_point(const double* x0, const double* x1, double tolerance) const override;
 
+  /// Of the placements that it holds only those of the contacts' joints and the object are what x has.
   const Model& model() const { return *model_; }
   int contact_count() const { return static_cast<int>(contacts_.size()); }
   int parameter_count() const { return static_cast<int>(free_parameters_.size()); }
@@ -170,6 +171,7 @@ class GraspSystem : public System {
 
   std::shared_ptr<Model> model_;
   std::vector<Contact> contacts_;
+  std::vector<int> placed_;           // joints of the contacts and of the object, and those that carry them
   RowMatrix motions_;                 // columns are the hand motions kept, in joint velocities
   RowMatrix motions_pseudo_inverse_;  // joint velocities to those along the motions
   RowMatrix transmission_;            // columns are the joint velocities that each actuated joint makes

@@ -36,12 +36,15 @@ JointTree::JointTree(const std::vector<AxisJoint>& joints, const ObjectJoint& ob
   }
 }
 
-void JointTree::place(const double* q, Placement* placements) const {
-  placements[0] = Placement();
-  for (std::size_t j = 0; j < joints_.size(); ++j) {
-    const Joint& joint = joints_[j];
+void JointTree::place(const double* q, const std::vector<int>& joints, Placement* placements) const {
+  for (const int j : joints) {
+    Placement& placement = placements[j];
+    if (j == object_index()) {
+      place_object(q + object_q_index_, placement);
+      continue;
+    }
+    const Joint& joint = joints_[static_cast<std::size_t>(j) - 1];
     const Placement& parent = placements[joint.axis.parent];
-    Placement& placement = placements[j + 1];
     const double* const number = q + joint.axis.q_index;
     if (joint.axis.turns) {
       const double sine = joint.axis.unbounded ? number[1] : std::sin(*number);
@@ -55,31 +58,39 @@ void JointTree::place(const double* q, Placement* placements) const {
       placement.translation.noalias() = parent.rotation * in_parent + parent.translation;
     }
   }
-  const double* const pose = q + object_q_index_;
-  Placement& object = placements[joints_.size() + 1];
+}
+
+void JointTree::place_object(const double* pose, Placement& placement) const {
   if (object_.kind() == ObjectJoint::Kind::free_flyer) {
-    object.rotation = Eigen::Map<const Eigen::Quaterniond>(pose + 3).toRotationMatrix();
-    object.translation = Eigen::Map<const Eigen::Vector3d>(pose);
-  } else if (object_.kind() == ObjectJoint::Kind::planar) {
-    object.rotation << pose[2], -pose[3], 0.0, pose[3], pose[2], 0.0, 0.0, 0.0, 1.0;
-    object.translation << pose[0], pose[1], 0.0;
+    placement.rotation = Eigen::Map<const Eigen::Quaterniond>(pose + 3).toRotationMatrix();
+    placement.translation = Eigen::Map<const Eigen::Vector3d>(pose);
+  } else {
+    placement.rotation << pose[2], -pose[3], 0.0, pose[3], pose[2], 0.0, 0.0, 0.0, 1.0;
+    placement.translation << pose[0], pose[1], 0.0;
   }
 }
 
-void JointTree::move(const Placement* placements, double* velocities) const {
-  for (std::size_t j = 0; j < joints_.size(); ++j, velocities += 6) {
-    const AxisJoint& joint = joints_[j].axis;
+void JointTree::move(const std::vector<int>& joints, const Placement* placements, double* velocities) const {
+  for (const int j : joints) {
+    double* const velocity = velocities + 6 * (static_cast<std::ptrdiff_t>(j) - 1);
+    if (j == object_index()) {
+      move_object(placements[j], velocity);
+      continue;
+    }
+    const AxisJoint& joint = joints_[static_cast<std::size_t>(j) - 1].axis;
     const Eigen::Vector3d axis = placements[joint.parent].rotation * joint.axis;
     if (joint.turns)
-      turn(axis, placements[j + 1].translation, velocities);
+      turn(axis, placements[j].translation, velocity);
     else
-      slide(axis, velocities);
+      slide(axis, velocity);
   }
-  if (object_.kind() == ObjectJoint::Kind::none) return;
-  const Placement& object = placements[joints_.size() + 1];
-  for (int i = 0; i < object_.lengths(); ++i, velocities += 6) slide(object.rotation.col(i), velocities);
-  for (int i = object_.lengths(); i < object_.dof(); ++i, velocities += 6)
-    turn(object.rotation.col(i - object_.dof() + 3), object.translation, velocities);
+}
+
+void JointTree::move_object(const Placement& placement, double* velocities) const {
+  const int lengths = object_.lengths(), first_axis = 3 - (object_.dof() - lengths);
+  for (int i = 0; i < lengths; ++i, velocities += 6) slide(placement.rotation.col(i), velocities);
+  for (int axis = first_axis; axis < 3; ++axis, velocities += 6)
+    turn(placement.rotation.col(axis), placement.translation, velocities);
 }
 
 }  // namespace graspatlas

@@ -27,10 +27,10 @@ class JointTree {
   /// joint, its pose and velocity the last numbers.
   JointTree(const std::vector<AxisJoint>& joints, const ObjectJoint& object, int object_q_index);
 
-  /// Placements of all joints at q, the base included.
-  void place(const double* q, Placement* placements) const;
-  /// Velocities [v_size x 6], see Model::velocity, where the placements are these.
-  void move(const Placement* placements, double* velocities) const;
+  /// Placements of some joints at q, each after those that carry it.
+  void place(const double* q, const std::vector<int>& joints, Placement* placements) const;
+  /// Their velocities [v_size x 6], see Model::velocity, where the placements are these.
+  void move(const std::vector<int>& joints, const Placement* placements, double* velocities) const;
 
  private:
   struct Joint {
@@ -39,6 +39,10 @@ class JointTree {
     // third.
     Eigen::Matrix3d constant, by_sine, by_cosine;
   };
+
+  void place_object(const double* pose, Placement& placement) const;
+  void move_object(const Placement& placement, double* velocities) const;
+  int object_index() const { return static_cast<int>(joints_.size()) + 1; }
 
   std::vector<Joint> joints_;
   ObjectJoint object_ = ObjectJoint::none;

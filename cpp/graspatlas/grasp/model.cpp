@@ -10,6 +10,7 @@
 #include <pinocchio/algorithm/kinematics.hpp>
 #include <pinocchio/multibody.hpp>
 #include <pinocchio/parsers/urdf.hpp>
+#include <set>
 
 #include "graspatlas/errors.hpp"
 
@@ -167,6 +168,7 @@ Model::Model(const std::string& urdf, const ObjectJoint& object)
   for (std::size_t j = 0; j < supports_.size(); ++j)
     for (const auto ancestor : model.supports[j])
       for (int v = 0; v < model.nvs[ancestor]; ++v) supports_[j].push_back(model.idx_vs[ancestor] + v);
+  for (int j = 1; j < model.njoints; ++j) all_joints_.push_back(j);
   make_tree();
 }
 
@@ -205,6 +207,7 @@ Model::Model(const Model& other)
       placements_(other.placements_),
       velocities_(other.velocities_),
       supports_(other.supports_),
+      all_joints_(other.all_joints_),
       tree_(other.tree_),
       has_tree_(other.has_tree_) {}
 
@@ -253,10 +256,18 @@ void Model::difference(const double* q0, const double* q1, double* out) const {
   });
 }
 
-void Model::update(const double* q, bool jacobians) {
+void Model::update(const double* q, bool jacobians, const std::vector<int>& joints) {
   if (!has_tree_) return update_with_pinocchio(q, jacobians);
-  tree_.place(q, placements_.data());
-  if (jacobians) tree_.move(placements_.data(), velocities_.data());
+  tree_.place(q, joints, placements_.data());
+  if (jacobians) tree_.move(joints, placements_.data(), velocities_.data());
+}
+
+std::vector<int> Model::carriers(const std::vector<int>& joints) const {
+  std::set<int> all;
+  for (const int joint : joints)
+    for (const auto carrier : pinocchio_->model.supports[static_cast<std::size_t>(joint)])
+      if (carrier > 0) all.insert(static_cast<int>(carrier));
+  return {all.begin(), all.end()};
 }
 
 void Model::update_with_pinocchio(const double* q, bool jacobians) {

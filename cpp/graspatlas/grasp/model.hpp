@@ -59,7 +59,11 @@ class Model {
   void difference(const double* q0, const double* q1, double* out) const;
 
   /// Placements of all joints, and with `jacobians` the columns below.
-  void update(const double* q, bool jacobians);
+  void update(const double* q, bool jacobians) { update(q, jacobians, all_joints_); }
+  /// The same of some joints, see `carriers`; what others have is not to be asked for.
+  void update(const double* q, bool jacobians, const std::vector<int>& joints);
+  /// These joints and those that carry them, ascending, without the base.
+  std::vector<int> carriers(const std::vector<int>& joints) const;
   const Placement& placement(int joint) const { return placements_[joint]; }
   /// Spatial velocity [linear at the world's origin, angular] of everything that tangent coordinate v
   /// carries.
@@ -79,6 +83,7 @@ class Model {
   std::vector<Placement> placements_;
   std::vector<double> velocities_;  // [v_size x 6]
   std::vector<std::vector<int>> supports_;
+  std::vector<int> all_joints_;
   JointTree tree_;
   bool has_tree_ = false;
 
