@@ -71,6 +71,16 @@ def test_distances_are_as_exact_far_from_zero() -> None:
         assert near.within(query, 3.0) == far.within(query + 2.0**30, 3.0)
 
 
+@pytest.mark.parametrize("scale", [1e-50, 1e15, 1e25, 1e60])
+def test_none_is_missed_whatever_the_scale(scale: float) -> None:
+    """Far from lengths that single precision can hold more may be found than are near, never less."""
+    points = np.random.default_rng(4).normal(size=(300, 3))
+    tree = fill(points * scale)
+    for query in points[:30]:
+        near = np.flatnonzero(np.linalg.norm(points - query, axis=1) <= 0.7)
+        assert set(near) <= set(tree.within(query * scale, 0.7000001 * scale))
+
+
 def test_search_while_points_come():
     rng = np.random.default_rng(5)
     points = np.cumsum(rng.normal(scale=0.1, size=(3000, 4)), axis=0)

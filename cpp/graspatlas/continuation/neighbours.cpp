@@ -11,6 +11,8 @@ namespace {
 constexpr double kLopsided = 0.85;
 // A number is kept to within so much of its size or less, and as much may be lost when it is compared.
 constexpr double kRounding = 1.0 / (1 << 22);
+// Numbers as large as this count as this one, whose square is no infinity. So points come nearer to each other at most.
+constexpr double kLargest = 1e18;
 // The work space of a rebuild of more points is given back.
 constexpr std::size_t kMostKept = 4096;
 
@@ -28,7 +30,7 @@ Neighbours::Neighbours(int size, double unit)
 double Neighbours::from_origin(const double* point, float* out) const {
   double largest = 0.0;
   for (int c = 0; c < size_; ++c) {
-    const double number = (point[c] - origin_[c]) * scale_;
+    const double number = std::clamp((point[c] - origin_[c]) * scale_, -kLargest, kLargest);
     out[c] = static_cast<float>(number);
     largest = std::max(largest, std::abs(number));
   }

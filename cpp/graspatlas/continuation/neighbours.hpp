@@ -31,7 +31,7 @@ bool is_within(const Number* a, const Number* b, int size, Number squared) {
 /// that the ball meets.
 class Neighbours {
  public:
-  /// Distances are told from each other best between a millionth and a million times `unit`.
+  /// Lengths from 1e-18 to 1e18 times `unit` can be told from each other.
   explicit Neighbours(int size, double unit = 1.0);
 
   /// Work space of `within`, one for each thread.
