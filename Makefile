@@ -38,7 +38,8 @@ sanitize: $(VENV)/.tools
 bench: $(VENV)/.tools
 	$(BIN)/python benchmarks/run.py
 
-# Against OMPL, SciPy and NumPy, and how cost grows; writes benchmarks/RESULTS.md in about eight minutes.
+# Against OMPL, SciPy and NumPy, how cost grows, and which k can be afforded; writes benchmarks/RESULTS.md, and the table
+# of docs/hand_motions.md, in about twelve minutes.
 compare: $(VENV)/.tools
 	$(BIN)/python -m pip install --quiet "graspatlas[compare]"
 	$(BIN)/python benchmarks/compare.py

@@ -1,7 +1,8 @@
 """Hold graspatlas against what users would take instead, and see how its cost grows: ``make compare``.
 
 All ratios are of processor times measured in this run, on this machine: what else it does counts less. The tables are
-printed, and written to RESULTS.md beside this file.
+printed, and written to RESULTS.md beside this file. ``compare.py afford`` makes that section of it anew, and leaves the
+others; so with the names of other sections.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from growth import PATIENCE, RADII, Row, by_dimension, by_problem_dimension, by_radius, by_threads
+from afford import PATIENCE, afford_table, measure, write_page
+from growth import Row, by_dimension, by_radius, by_threads
 from numpy_atlas import NumpyAtlas
 
 import graspatlas as ga
@@ -206,11 +208,23 @@ def growth() -> Iterator[str]:
     yield from growth_table("The can, k = 2, radius halved four times", by_radius("schunk_can", 2, 0.34))
     yield from growth_table("The oil bottle, k = 3, radius halved four times", by_radius("schunk_oil_bottle", 3, 0.8))
     yield from growth_table("Unit spheres of 1 to 6 dimensions, epsilon = 0.3", by_dimension(0.3))
-    for name in RADII:
-        yield from growth_table(
-            f"Which k can be afforded: {name}, one thread, up to {PATIENCE:g} s", by_problem_dimension(name)
-        )
     yield from growth_table("The can, k = 2, r = 0.0425, threads", by_threads("schunk_can", 2, 0.0425))
+
+
+def affordable() -> Iterator[str]:
+    """What two to six dimensions cost."""
+    yield "## Which k you can afford"
+    yield ""
+    yield (
+        f"One thread, epsilon = 0.5; an atlas is given up after {PATIENCE:g} s. Seconds are of the processor, "
+        "gigabytes what came to the process at the peak, the arrays of the atlas included. The last two columns are "
+        "what a chart costs in the larger of the two atlases."
+    )
+    yield ""
+    lines = afford_table(measure())
+    write_page(lines)
+    yield from lines
+    yield ""
 
 
 def machine() -> Iterator[str]:
@@ -234,6 +248,15 @@ def machine() -> Iterator[str]:
     yield f"Python {platform.python_version()}, {', '.join(found)}."
 
 
+SECTIONS = {
+    "ompl": against_ompl,
+    "numpy": against_numpy,
+    "multistart": against_multistart,
+    "growth": growth,
+    "afford": affordable,
+}
+
+
 def report() -> Iterator[str]:
     """All lines of the report, as they are ready."""
     yield "# Comparisons"
@@ -243,20 +266,42 @@ def report() -> Iterator[str]:
     yield ""
     yield from machine()
     yield ""
-    yield from against_ompl()
-    yield from against_numpy()
-    yield from against_multistart()
-    yield from growth()
+    for section in SECTIONS.values():
+        yield from section()
+
+
+def printed(lines: Iterator[str]) -> str:
+    """Lines as they come, and then as one text."""
+    out = []
+    for line in lines:
+        print(line, flush=True)
+        out.append(line)
+    return "\n".join(out).rstrip() + "\n"
+
+
+def with_section(text: str, section: str) -> str:
+    """A report with this section in the place of the one that has its heading, or at the end."""
+    heading = section.partition("\n")[0] + "\n"
+    before, found, rest = text.partition(heading)
+    if not found:
+        return f"{text}\n{section}"
+    _, next_mark, after = rest.partition("\n## ")
+    return before + section + (next_mark + after if next_mark else "")
 
 
 def main() -> None:
-    """Print the report line by line, and write it."""
+    """Print the report line by line, and write it; with arguments only the sections that they name."""
+    names = sys.argv[1:]
+    if unknown := set(names) - set(SECTIONS):
+        sys.exit(f"no section is called {', '.join(sorted(unknown))}; there are {', '.join(SECTIONS)}")
     start = time.perf_counter()
-    lines = []
-    for line in report():
-        print(line, flush=True)
-        lines.append(line)
-    RESULTS.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
+    if names:
+        text = RESULTS.read_text(encoding="utf-8")
+        for name in names:
+            text = with_section(text, printed(SECTIONS[name]()))
+    else:
+        text = printed(report())
+    RESULTS.write_text(text, encoding="utf-8")
     print(f"wrote {RESULTS.name} after {time.perf_counter() - start:.0f} s", file=sys.stderr)
 
 

@@ -30,13 +30,14 @@ class Row:
     status: str
 
 
-def _resident() -> int:
+def resident() -> int:
+    """Memory of this process [bytes]."""
     with open("/proc/self/statm", encoding="ascii") as file:
         return int(file.read().split()[1]) * PAGE
 
 
 def _measure(build: Callable[[], ga.Atlas], results: Any) -> None:
-    before, start = _resident(), time.process_time()
+    before, start = resident(), time.process_time()
     atlas = build()
     used = time.process_time() - start
     peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -55,14 +56,10 @@ def measured(name: str, build: Callable[[], ga.Atlas]) -> Row:
 
 
 def problem_atlas(name: str, dimension: int, radius: float, **options: Any) -> Callable[[], ga.Atlas]:
-    """Work that builds the atlas of a bundled problem."""
-
-    def build() -> ga.Atlas:
-        problem = ga.load_problem(name)
-        system = problem.system(dimension)
-        return ga.build_atlas(system, problem.x1_array, radius=radius, epsilon=0.5, progress=False, **options)
-
-    return build
+    """Work that builds the atlas of a bundled problem, which is loaded at once."""
+    problem = ga.load_problem(name)
+    system = problem.system(dimension)
+    return lambda: ga.build_atlas(system, problem.x1_array, radius=radius, epsilon=0.5, progress=False, **options)
 
 
 def sphere_atlas(dimension: int, radius: float) -> Callable[[], ga.Atlas]:
@@ -81,22 +78,6 @@ def by_dimension(radius: float) -> list[Row]:
     """Spheres of one to six dimensions; with five and six the charts are larger."""
     radii = {**dict.fromkeys(range(1, 5), radius), 5: 0.7, 6: 0.8}
     return [measured(f"k = {k}, r = {r:g}", sphere_atlas(k, r)) for k, r in radii.items()]
-
-
-#: Radii with which k dimensions of a bundled problem can be covered, and the time after which that is given up [s].
-RADII = {
-    "schunk_oil_bottle": {2: 0.1, 3: 0.2, 4: 0.4, 5: 0.8, 6: 1.0},
-    "schunk_can": {2: 0.1, 3: 0.2, 4: 0.8, 5: 1.2, 6: 1.4},
-}
-PATIENCE = 60.0
-
-
-def by_problem_dimension(name: str) -> list[Row]:
-    """A bundled problem in two to six dimensions, the charts the larger the more there are."""
-    return [
-        measured(f"k = {k}, r = {radius:g}", problem_atlas(name, k, radius, threads=1, max_seconds=PATIENCE))
-        for k, radius in RADII[name].items()
-    ]
 
 
 def by_threads(name: str, dimension: int, radius: float) -> list[Row]:

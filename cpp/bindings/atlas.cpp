@@ -105,12 +105,18 @@ Checkpoint read_checkpoint(const ArrayTable& table) {
   return out;
 }
 
-ArrayTable write_checkpoint(const Checkpoint& checkpoint) {
+/// An array of these numbers themselves, no copy.
+template <class T>
+py::array_t<T> array_of(std::vector<T>&& numbers) {
+  auto owned = std::make_unique<std::vector<T>>(std::move(numbers));
+  const py::capsule owner(owned.get(), [](void* vector) { delete static_cast<std::vector<T>*>(vector); });
+  const std::vector<T>& kept = *owned.release();
+  return py::array_t<T>(static_cast<py::ssize_t>(kept.size()), kept.data(), owner);
+}
+
+ArrayTable write_checkpoint(Checkpoint&& checkpoint) {
   ArrayTable out;
-  visit_checkpoint(checkpoint, [&out](const char* name, const auto& part) {
-    out[name] = py::array_t<typename std::decay_t<decltype(part)>::value_type>(static_cast<py::ssize_t>(part.size()),
-                                                                               part.data());
-  });
+  visit_checkpoint(checkpoint, [&out](const char* name, auto& part) { out[name] = array_of(std::move(part)); });
   const std::int64_t counts[] = {checkpoint.position,     checkpoint.next_first,  checkpoint.expansion_count,
                                  checkpoint.audit.rounds, checkpoint.audit.holes, checkpoint.audit.new_first,
                                  checkpoint.audit.points};
@@ -183,7 +189,11 @@ void bind_atlas(py::module_& module) {
           "arrays", [](const Atlas& atlas) { return atlas_arrays<const Atlas>(atlas, &flatten); },
           "The atlas as a dictionary of arrays.")
       .def(
-          "take_arrays", [](Atlas& atlas) { return atlas_arrays<Atlas>(atlas, &move_flat); },
+          "take_arrays",
+          [](Atlas& atlas) {
+            atlas.charts_to_give_back().forget_places();
+            return atlas_arrays<Atlas>(atlas, &move_flat);
+          },
           "The same, for which the builder gives its own memory back: nothing but counts can be asked of it any more.");
 }
 

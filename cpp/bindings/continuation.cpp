@@ -334,7 +334,10 @@ void bind_parts(py::module_& module) {
             std::sort(out.begin(), out.end());
             return out;
           },
-          py::arg("point"), py::arg("distance"), "Numbers of the points within a distance, ascending.");
+          py::arg("point"), py::arg("distance"),
+          "Numbers of the points within a distance, and maybe of some farther by a millionth of how far the points are "
+          "from "
+          "the first one, ascending.");
 }
 
 /// Rows that did not get there are left where the method ended.

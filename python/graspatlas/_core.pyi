@@ -297,7 +297,7 @@ class Neighbours:
         distance: typing.SupportsFloat | typing.SupportsIndex,
     ) -> list[int]:
         """
-        Numbers of the points within a distance, ascending.
+        Numbers of the points within a distance, and maybe of some farther by a millionth of how far the points are from the first one, ascending.
         """
 
 class Closed:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -139,20 +140,63 @@ def test_arrays_that_are_taken_are_those_that_are_copied(k: int, radius: float, 
         np.testing.assert_array_equal(array, taken[name], err_msg=name)
 
 
+#: What a process of its own says of its memory [bytes], by the names of /proc: getrusage would count its parent's, too.
+MEMORY = """
+import numpy as np, graspatlas as ga
+from graspatlas import _core
+
+def memory(name):
+    with open("/proc/self/status") as lines:
+        return next(1024 * int(line.split()[1]) for line in lines if line.startswith(name + ":"))
+"""
+reads_proc = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+
+
+def printed_by(program: str) -> list[float]:
+    """The numbers that a program prints which looks at its own memory, in pages of the usual size."""
+    environment = {**os.environ, "NUMPY_MADVISE_HUGEPAGE": "0"}
+    done = subprocess.run(
+        [sys.executable, "-c", MEMORY + program], capture_output=True, text=True, check=True, env=environment
+    )
+    return [float(word) for word in done.stdout.split()]
+
+
+@reads_proc
 def test_an_atlas_and_its_arrays_are_not_held_at_the_same_time() -> None:
-    """The peak of memory, in a process of its own, is hardly more than what was held before arrays were made."""
-    program = (
-        "import resource, numpy as np, graspatlas as ga\n"
-        "from graspatlas import _core\n"
-        "peak = lambda: 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+    """The peak of memory is hardly more than what was held before arrays were made."""
+    (share,) = printed_by(
         "builder = _core.AtlasBuilder(ga.systems.Sphere(4), np.eye(4)[0], 0.04, 0.3, 1)\n"
         "builder.expand(40_000, 1e9)\n"
-        "before = peak()\n"
+        "before = memory('VmHWM')\n"
         "arrays = builder.take_arrays()\n"
-        "print((peak() - before) / sum(array.nbytes for array in arrays.values()))\n"
+        "print((memory('VmHWM') - before) / sum(array.nbytes for array in arrays.values()))\n"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert float(done.stdout) < 0.3
+    assert share < 0.3
+
+
+#: By k: a bundled problem, the radius, and what a chart may take at the peak [bytes].
+PEAKS = {
+    2: ("schunk_can", 0.06, 1300),
+    3: ("schunk_oil_bottle", 0.1, 2600),
+    4: ("schunk_oil_bottle", 0.4, 6000),
+}
+
+
+@reads_proc
+@pytest.mark.parametrize("k", PEAKS)
+def test_peak_of_memory_for_each_chart(k: int) -> None:
+    """All that comes to the process while `build_atlas` makes an atlas of some 40 MB."""
+    name, radius, most = PEAKS[k]
+    charts, each = printed_by(
+        f"problem = ga.load_problem('{name}')\n"
+        f"system, x1, sizes = problem.system({k}), problem.x1_array, dict(radius={radius}, epsilon=0.5)\n"
+        "ga.build_atlas(system, x1, **sizes, threads=1, max_charts=100)\n"
+        "before = memory('VmRSS')\n"
+        "atlas = ga.build_atlas(system, x1, **sizes, threads=1)\n"
+        "print(atlas.n_charts, (memory('VmHWM') - before) / atlas.n_charts)\n"
+    )
+    assert charts > 5000
+    assert 400 < each < most
 
 
 def test_what_the_machine_has():

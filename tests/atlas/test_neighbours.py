@@ -47,12 +47,38 @@ def test_equals_brute_force(seed, size, count, kind, distance):
     rng = np.random.default_rng(seed + 1)
     queries = [points[rng.integers(count)], rng.normal(size=size), points[0] + 1e-3]
     for query in queries:
-        squared = ((points - query) ** 2).sum(axis=1)
-        expected = np.flatnonzero(squared <= distance**2)
-        unsure = np.flatnonzero(np.abs(squared - distance**2) < 1e-12)
-        got = tree.within(query, distance)
-        assert got == sorted(set(got))
-        assert set(got) ^ set(expected.tolist()) <= set(unsure.tolist())
+        assert_within(tree, points, query, distance)
+
+
+def assert_within(tree: Neighbours, points: np.ndarray, query: np.ndarray, distance: float) -> None:
+    """All that are near are found, and of the others only some that are hardly farther away."""
+    distances = np.linalg.norm(points - query, axis=1)
+    far = np.linalg.norm(points[0] - query) + distance
+    rounding = 1e-6 * (far + distance) * (points.shape[1] + 4)
+    got = tree.within(query, distance)
+    assert got == sorted(set(got))
+    assert set(np.flatnonzero(distances <= distance)) <= set(got)
+    assert set(got) <= set(np.flatnonzero(distances <= distance + rounding))
+
+
+def test_distances_are_as_exact_far_from_zero() -> None:
+    """What counts is how far points are from the first one, not from the origin."""
+    rng = np.random.default_rng(3)
+    points = np.round(rng.normal(size=(500, 6)) * 2**16) / 2**16  # which stay as they are far away
+    near, far = fill(points), fill(points + 2.0**30)
+    for query in points[:50]:
+        assert len(near.within(query, 3.0)) > 1
+        assert near.within(query, 3.0) == far.within(query + 2.0**30, 3.0)
+
+
+@pytest.mark.parametrize("scale", [1e-50, 1e15, 1e25, 1e60])
+def test_none_is_missed_whatever_the_scale(scale: float) -> None:
+    """Far from lengths that single precision can hold more may be found than are near, never less."""
+    points = np.random.default_rng(4).normal(size=(300, 3))
+    tree = fill(points * scale)
+    for query in points[:30]:
+        near = np.flatnonzero(np.linalg.norm(points - query, axis=1) <= 0.7)
+        assert set(near) <= set(tree.within(query * scale, 0.7000001 * scale))
 
 
 def test_search_while_points_come():
@@ -60,9 +86,8 @@ def test_search_while_points_come():
     points = np.cumsum(rng.normal(scale=0.1, size=(3000, 4)), axis=0)
     tree = Neighbours(4)
     for i, point in enumerate(points):
-        if i % 50 == 0:
-            near = np.flatnonzero(((points[:i] - point) ** 2).sum(axis=1) <= 0.25)
-            assert tree.within(point, 0.5) == near.tolist()
+        if i % 50 == 1:
+            assert_within(tree, points[:i], point, 0.5)
         tree.insert(point)
 
 

@@ -15,7 +15,7 @@ using namespace graspatlas;
 
 /// Charts without a manifold: of each only its key is known, and a place on a line.
 struct Store {
-  Charts charts{1, 1, 1};
+  Charts charts{1, 1, 1, 1.0};
   Front front{charts};
 
   void add(ChartKey key, double place = 0.0) {
@@ -82,7 +82,7 @@ void paused_and_deferred() {
 // The window hands out at the same time what is far apart, and nothing else.
 void windows() {
   const Sphere line(2);  // of which only embeddings are asked, by their two numbers
-  Charts charts(2, 2, 2);
+  Charts charts(2, 2, 2, 1.0);
   Front front(charts);
   for (int i = 0; i < 3; ++i) {
     const int slot = charts.add();

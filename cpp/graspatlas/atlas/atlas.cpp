@@ -33,7 +33,8 @@ void check_options(const AtlasOptions& options, const System& system) {
 Atlas::Atlas(System& system, const AtlasOptions& options, int threads)
     : system_(system),
       options_(options),
-      charts_(system.configuration_size(), system.dimension() * system.tangent_size(), system.embedding_size()),
+      charts_(system.configuration_size(), system.dimension() * system.tangent_size(), system.embedding_size(),
+              options.radius),
       front_(charts_),
       window_(system, options.radius, front_) {
   check_options(options, system);
@@ -161,6 +162,12 @@ bool Atlas::begin_charts_at_holes() {
 Checkpoint Atlas::save(std::int64_t first) const {
   const int x_size = system_.configuration_size(), k = system_.dimension(), basis_size = k * system_.tangent_size();
   Checkpoint out;
+  const auto charts = static_cast<std::size_t>(std::max<std::int64_t>(count() - first, 0));
+  out.centers.reserve(charts * static_cast<std::size_t>(x_size));
+  out.bases.reserve(charts * static_cast<std::size_t>(basis_size));
+  out.residuals.reserve(charts);
+  out.regularities.reserve(charts);
+  out.keys.reserve(charts);
   for (std::int64_t i = first; i < count(); ++i) {
     out.centers.insert(out.centers.end(), center(i), center(i) + x_size);
     out.bases.insert(out.bases.end(), basis(i), basis(i) + basis_size);

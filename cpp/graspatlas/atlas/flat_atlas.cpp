@@ -22,8 +22,8 @@ void copy_facets(const Atlas& atlas, const Polytope& p, std::int64_t first, cons
   }
 }
 
-// Charts are moved in so many parts, or in parts of so many.
-constexpr int kMoves = 64, kLeastMoved = 2048;
+// Charts are moved in so many parts, or in parts that take so many bytes.
+constexpr std::int64_t kMoves = 64, kLeastMoved = 1 << 20;
 
 std::int64_t count_vertices(const Polytope& p) {
   if (p.listed() == Polytope::Listed::all) return p.vertex_count();
@@ -99,8 +99,9 @@ void flatten(const Atlas& atlas, const FlatStarts& starts, const FlatAtlas& out)
 // By slots, in which order the charts lie in memory.
 void move_flat(Atlas& atlas, const FlatStarts& starts, const FlatAtlas& out) {
   Charts& charts = atlas.charts_to_give_back();
-  charts.forget_places();
-  const int count = charts.count(), part = std::max(kLeastMoved, count / kMoves);
+  const int count = charts.count();
+  const auto parts = static_cast<int>(std::clamp<std::int64_t>(atlas.bytes() / kLeastMoved, 1, kMoves));
+  const int part = (count + parts - 1) / parts;
   for (int begin = 0; begin < count; begin += part) {
     const int end = std::min(begin + part, count);
     parallel_for(atlas.threads(), end - begin, [&](int, std::int64_t first, std::int64_t last) {

@@ -30,8 +30,6 @@ struct Chart {
   Polytope polytope;                ///< facets are tagged by the slots of the charts behind them
   const int* neighbours = nullptr;  ///< slots of the neighbours older than the chart itself
   int neighbour_count = 0;
-  bool done = false;      ///< no vertex was left to expand when it was expanded
-  bool closed = false;    ///< vertices of it were closed
   int number = -1;        ///< in the order of the algorithm; -1 until that is settled
   ChartKey key = 0;       ///< ascends in the order of the algorithm
   double residual = 0.0;  ///< largest entry of |R| at the centre
@@ -39,6 +37,8 @@ struct Chart {
   /// another than a neighbour's, beside the orientations of their bases, it has lost it between the two.
   double regularity = 1.0;
   Rank rank = Rank::full;
+  bool done = false;    ///< no vertex was left to expand when it was expanded
+  bool closed = false;  ///< vertices of it were closed
 };
 
 }  // namespace graspatlas

@@ -19,8 +19,8 @@ namespace graspatlas {
 /// looking neighbours up take a lock.
 class Charts {
  public:
-  Charts(int x_size, int basis_size, int embedding_size)
-      : x_size_(x_size), charts_(1), rows_(x_size + basis_size), index_(embedding_size) {}
+  Charts(int x_size, int basis_size, int embedding_size, double radius)
+      : x_size_(x_size), radius_(radius), charts_(1), rows_(x_size + basis_size), index_(embedding_size, radius) {}
 
   Chart& operator[](int slot) { return *charts_[static_cast<std::size_t>(slot)]; }
   const Chart& operator[](int slot) const { return *charts_[static_cast<std::size_t>(slot)]; }
@@ -45,7 +45,7 @@ class Charts {
     index_.insert(embedding, slot);
   }
 
-  /// Slots of the published charts within a distance, in no order.
+  /// Slots of the published charts within a distance, and maybe of some hardly farther away, in no order.
   void near(const double* embedding, double distance, std::vector<int>& out, Neighbours::Scratch& scratch) const {
     for (SpinWait spin; !indexing_.try_lock_shared();) spin.wait();
     const std::shared_lock lock(indexing_, std::adopt_lock);
@@ -58,7 +58,7 @@ class Charts {
 
   /// Gives memory back: that by which `near` finds charts, and the centres, bases and polytopes of the charts before
   /// `last`, of which nothing can be asked any more.
-  void forget_places() { index_ = Neighbours(index_.size()); }
+  void forget_places() { index_ = Neighbours(index_.size(), radius_); }
   void forget_before(int last) {
     for (; forgotten_ < last; ++forgotten_) (*this)[forgotten_].polytope = Polytope();
     rows_.forget_before(static_cast<std::size_t>(last));
@@ -70,6 +70,7 @@ class Charts {
 
  private:
   int x_size_, forgotten_ = 0;
+  double radius_;
   StableRows<Chart> charts_;
   StableRows<double> rows_;  // centre and basis
   Neighbours index_;

@@ -137,7 +137,7 @@ int Polytope::new_facet(const double* normal, double offset, int tag) {
   while (slot < facet_count_ && uses()[slot] > 0) ++slot;
   if (slot == facet_count_) {
     if (slot > std::numeric_limits<FacetIndex>::max()) throw Error("a polytope has too many facets");
-    if (facet_count_ == facet_capacity_) resize(vertex_capacity_, facet_capacity_ + 2 + facet_capacity_ / 8);
+    if (facet_count_ == facet_capacity_) resize(vertex_capacity_, facet_capacity_ + 1 + facet_capacity_ / 8);
     uses()[facet_count_++] = 0;
   }
   std::copy_n(normal, k_, normals() + static_cast<std::ptrdiff_t>(slot) * k_);

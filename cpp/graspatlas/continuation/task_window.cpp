@@ -142,7 +142,7 @@ bool TaskWindow::begin_generation() {
 void TaskWindow::place_generation() {
   const std::vector<int>& generation = front_.generation();
   const auto size = static_cast<std::size_t>(system_.embedding_size());
-  embeddings_.resize(generation.size() * size);
+  embeddings_ = std::vector<double>(generation.size() * size);  // no larger than that
   for (std::size_t i = 0; i < generation.size(); ++i)
     system_.embed(front_.center(generation[i]), &embeddings_[i * size]);
 }

@@ -24,7 +24,7 @@ _SLICE_SECONDS = 0.1
 #: Work that a killed run can lose [s], but for the time that writing takes.
 _CHECKPOINT_SECONDS = 20.0
 #: What the builder's memory takes at most while its arrays are made, with what the heap needs for itself.
-_HELD = 1.3
+_HELD = 1.2
 #: A coarse atlas that tells the size of the one being grown has this part of its charts, about.
 _COARSE_SHARE = 1 / 30
 
@@ -126,6 +126,7 @@ class Growth:
             return Status.INTERRUPTED
         finally:
             with held():
+                self._coarse = None  # its memory is wanted for the arrays
                 bar.close()
         return Status.COMPLETE
 
