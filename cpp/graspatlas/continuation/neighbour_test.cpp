@@ -17,22 +17,6 @@ constexpr double kMiss = 0.1, kOff = 0.2 * kDoubt;
 // about as much.
 constexpr double kNear = 0.02;
 
-double compare(const double* Phi_i, const double* Phi_j, const double* d, int k, int n, double* p_i, double* p_j,
-               double* M) {
-  switch (k) {
-    case 1:
-      return compare_bases<1>(Phi_i, Phi_j, d, k, n, p_i, p_j, M);
-    case 2:
-      return compare_bases<2>(Phi_i, Phi_j, d, k, n, p_i, p_j, M);
-    case 3:
-      return compare_bases<3>(Phi_i, Phi_j, d, k, n, p_i, p_j, M);
-    case 4:
-      return compare_bases<4>(Phi_i, Phi_j, d, k, n, p_i, p_j, M);
-    default:
-      return compare_bases<0>(Phi_i, Phi_j, d, k, n, p_i, p_j, M);
-  }
-}
-
 }  // namespace
 
 NeighbourTest::NeighbourTest(System& system, Newton& newton, double radius, double epsilon)
@@ -49,19 +33,38 @@ NeighbourTest::NeighbourTest(System& system, Newton& newton, double radius, doub
       miss_(n_),
       in_chart_(k_) {}
 
-// Eq (17) is a length, which may exceed a chart's own size: then charts on two sides of a fold would cut each other at
-// images far from the middle between them, and leave a gap. So the displacement between the centres, too, may differ
-// from either tangent space by no larger an angle than eq (18) allows between the spaces.
 bool NeighbourTest::fits(const double* x_i, const double* Phi_i, const double* x_j, const double* Phi_j, double* p_ij,
                          double* p_ji) {
   system_.difference(x_i, x_j, displacement_.data());
-  double* const M = work_.data();
-  const double squared = compare(Phi_i, Phi_j, displacement_.data(), k_, n_, p_ij, p_ji, M);
+  switch (k_) {
+    case 2:
+      return fit<2>(Phi_i, Phi_j, p_ij, p_ji);
+    case 3:
+      return fit<3>(Phi_i, Phi_j, p_ij, p_ji);
+    case 4:
+      return fit<4>(Phi_i, Phi_j, p_ij, p_ji);
+    case 5:
+      return fit<5>(Phi_i, Phi_j, p_ij, p_ji);
+    case 6:
+      return fit<6>(Phi_i, Phi_j, p_ij, p_ji);
+    default:
+      return fit<0>(Phi_i, Phi_j, p_ij, p_ji);
+  }
+}
+
+// Eq (17) is a length, which may exceed a chart's own size: then charts on two sides of a fold would cut each other at
+// images far from the middle between them, and leave a gap. So the displacement between the centres, too, may differ
+// from either tangent space by no larger an angle than eq (18) allows between the spaces.
+template <int K>
+bool NeighbourTest::fit(const double* Phi_i, const double* Phi_j, double* p_ij, double* p_ji) {
+  const double squared = project_on_both<K>(Phi_i, Phi_j, displacement_.data(), k_, n_, p_ij, p_ji);
   if (squared > 4.0 * radius_ * radius_) return false;
   const double cosine = 1.0 - epsilon_;
   const double limit = std::min(epsilon_ * epsilon_, (1.0 - cosine * cosine) * squared);
-  // What of d lies outside a tangent space.
+  // What of the displacement lies outside a tangent space.
   if (squared - squared_length(p_ij, k_) > limit || squared - squared_length(p_ji, k_) > limit) return false;
+  double* const M = work_.data();
+  multiply_bases<K>(Phi_i, Phi_j, k_, n_, M);
   if (!tangent_spaces_agree(M, k_, cosine, M + static_cast<std::ptrdiff_t>(k_) * k_)) return false;
   squared_doubt_ = squared > 0.0 ? squared_sheet_doubt(p_ij, p_ji, M, squared, k_) : 0.0;
   for (int a = 0; a < k_; ++a) p_ji[a] = -p_ji[a];

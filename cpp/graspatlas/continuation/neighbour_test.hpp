@@ -31,33 +31,43 @@ inline double project_displacement(const double* Phi, const double* d, int k, in
   return squared > 0.0 ? squared : 0.0;
 }
 
-/// What two bases [k x n] say about a displacement d and about each other, in one pass over their columns: p_i = Phi_i
-/// d, p_j = Phi_j d [k] and M = Phi_i Phi_j' [k x k]; returns |d|^2. K is k where the compiler may know it, else 0.
+/// Coordinates of one vector in two bases: p_i = Phi_i d, p_j = Phi_j d [k]; returns |d|^2. Here and below K is k where
+/// the compiler knows it, which then keeps all sums side by side, else 0.
 template <int K>
-double compare_bases(const double* Phi_i, const double* Phi_j, const double* d, int k_, int n, double* p_i, double* p_j,
-                     double* M) {
-  const int k = K > 0 ? K : k_;
-  double squared = 0.0;
-  double sums_i[K > 0 ? K : 1], sums_j[K > 0 ? K : 1], products[K > 0 ? K * K : 1];
-  double *const to_i = K > 0 ? sums_i : p_i, *const to_j = K > 0 ? sums_j : p_j, *const to_M = K > 0 ? products : M;
-  std::fill_n(to_i, k, 0.0);
-  std::fill_n(to_j, k, 0.0);
-  std::fill_n(to_M, k * k, 0.0);
-  for (int c = 0; c < n; ++c) {
-    squared += d[c] * d[c];
-    for (int a = 0; a < k; ++a) {
-      const double on_i = Phi_i[a * n + c];
-      to_i[a] += on_i * d[c];
-      to_j[a] += Phi_j[a * n + c] * d[c];
-      for (int b = 0; b < k; ++b) to_M[a * k + b] += on_i * Phi_j[b * n + c];
+double project_on_both(const double* Phi_i, const double* Phi_j, const double* d, int k, int n, double* p_i,
+                       double* p_j) {
+  if constexpr (K == 0) {
+    tangent_coordinates(Phi_i, d, k, n, p_i);
+    tangent_coordinates(Phi_j, d, k, n, p_j);
+    return squared_length(d, n);
+  } else {
+    double squared = 0.0, sums_i[K] = {}, sums_j[K] = {};
+    for (int c = 0; c < n; ++c) {
+      squared += d[c] * d[c];
+      for (int a = 0; a < K; ++a) {
+        sums_i[a] += Phi_i[a * n + c] * d[c];
+        sums_j[a] += Phi_j[a * n + c] * d[c];
+      }
+    }
+    std::copy_n(sums_i, K, p_i);
+    std::copy_n(sums_j, K, p_j);
+    return squared;
+  }
+}
+
+/// M = Phi_i Phi_j' [k x k].
+template <int K>
+void multiply_bases(const double* Phi_i, const double* Phi_j, int k, int n, double* M) {
+  if constexpr (K == 0) {
+    for (int a = 0; a < k; ++a) tangent_coordinates(Phi_j, Phi_i + a * n, k, n, M + a * k);
+  } else {
+    for (int a = 0; a < K; ++a) {
+      double products[K] = {};
+      for (int c = 0; c < n; ++c)
+        for (int b = 0; b < K; ++b) products[b] += Phi_i[a * n + c] * Phi_j[b * n + c];
+      std::copy_n(products, K, M + a * K);
     }
   }
-  if (K > 0) {
-    std::copy_n(to_i, k, p_i);
-    std::copy_n(to_j, k, p_j);
-    std::copy_n(to_M, k * k, M);
-  }
-  return squared;
 }
 
 /// Eq (18): true when the smallest singular value of M = Phi_i Phi_j' [k x k] is at least `cosine` >= 0, that is when
@@ -155,6 +165,9 @@ class NeighbourTest {
   std::int64_t projections() const { return projections_; }
 
  private:
+  template <int K>
+  bool fit(const double* Phi_i, const double* Phi_j, double* p_ij, double* p_ji);
+
   System& system_;
   Newton& newton_;
   double radius_, epsilon_;
