@@ -9,6 +9,7 @@ from helpers import chain, robot
 from problem_texts import CAN, read
 
 import graspatlas as ga
+from graspatlas import _core
 from graspatlas.hand.robot_files import example_robot
 
 FINGER = robot(
@@ -31,6 +32,25 @@ def test_locked_joints_are_where_they_would_be():
     places = hand.link_placements(turn)
     for name in ("f_0", "f_1", "f_2", "f_tip"):
         np.testing.assert_allclose(places[name], data.oMf[reduced.getFrameId(name)].homogeneous, atol=1e-14)
+
+
+@pytest.mark.parametrize("kinds", [["revolute", "continuous", "prismatic"], ["continuous", "floating", "revolute"]])
+@pytest.mark.parametrize("thing", ["free_flyer", "planar", "none"])
+def test_placements_are_pinocchio_s(kinds: list[str], thing: str) -> None:
+    """Of joints that turn or slide, which the core places itself, and of others, which it leaves to Pinocchio."""
+    text = robot(
+        chain("f", (0.02, 0.0, 0.1), ["0 0 1", "0 1 0", "0.3 1 0.2"], 0.05, kinds),
+        chain("g", (0.0, 0.03, 0.1), ["1 0 0", "0 -1 0"], 0.04, ["prismatic", "revolute"]),
+    )
+    ours, model = _core.Model(text, thing), pin.buildModelFromXML(text)
+    data = model.createData()
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        q = pin.integrate(model, pin.neutral(model), rng.uniform(-2.0, 2.0, model.nv))
+        pin.framesForwardKinematics(model, data, q)
+        places = ours.frame_placements(np.concatenate([q, ours.neutral[model.nq :]]))
+        for name, place in places.items():
+            np.testing.assert_allclose(place, data.oMf[model.getFrameId(name)].homogeneous, rtol=0, atol=1e-14)
 
 
 def test_joints_that_move_and_the_rest_locked():

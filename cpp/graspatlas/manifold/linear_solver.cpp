@@ -83,7 +83,6 @@ void LinearSolver::take_pivot(int step, int column, int pivot) {
   const double* const row = rows_[step];
   determinant_negative_ ^= (pivot != step) != (row[column] < 0.0);
   inverse_pivots_[step] = 1.0 / row[column];
-  std::fill(factors(step) + step, factors(step) + padded(step), 0.0);
   for (int c = 0; c < column; ++c) entries_of_column(c)[step] = row[c];
 }
 
