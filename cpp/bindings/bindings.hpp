@@ -15,6 +15,9 @@ using ArrayTable = pybind11::typing::Dict<pybind11::str, pybind11::array>;
 /// Pointer to the numbers of a one-dimensional array of this size; an Error that names it otherwise.
 const double* checked_vector(const DoubleArray& array, pybind11::ssize_t size, const char* name);
 
+/// Rows of a batch of grasps X [n x columns]; an Error where it has other columns.
+pybind11::ssize_t checked_rows(const DoubleArray& X, pybind11::ssize_t columns);
+
 template <class T>
 pybind11::array_t<T> matrix(pybind11::ssize_t rows, pybind11::ssize_t columns) {
   return pybind11::array_t<T>(std::vector<pybind11::ssize_t>{rows, columns});

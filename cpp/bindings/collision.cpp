@@ -217,8 +217,8 @@ py::array_t<double> point_distances(CollisionBatch& batch, const DoubleArray& X,
   return out;
 }
 
-std::shared_ptr<CollisionBatch> make_batch(const Model& model, const std::vector<ShapeTuple>& tuples,
-                                           const IntArray& pairs, const DoubleArray& required) {
+std::shared_ptr<CollisionBatch> make_collision_batch(const Model& model, const std::vector<ShapeTuple>& tuples,
+                                                     const IntArray& pairs, const DoubleArray& required) {
   std::vector<CollisionShape> shapes;
   for (const ShapeTuple& tuple : tuples) shapes.push_back(shape_from(tuple));
   if (pairs.ndim() != 2 || pairs.shape(1) != 2 || required.ndim() != 1 || required.shape(0) != pairs.shape(0))
@@ -233,7 +233,7 @@ std::shared_ptr<CollisionBatch> make_batch(const Model& model, const std::vector
 void bind_collision(py::module_& module) {
   py::class_<CollisionBatch, std::shared_ptr<CollisionBatch>>(
       module, "CollisionBatch", "Collision shapes of hand and object; safe to call from any number of threads.")
-      .def(py::init(&make_batch), py::arg("model"), py::arg("shapes"), py::arg("pairs"), py::arg("required"),
+      .def(py::init(&make_collision_batch), py::arg("model"), py::arg("shapes"), py::arg("pairs"), py::arg("required"),
            "From shapes (name, kind, sizes [3], points [n x 3], triangles [t x 3], joint, placement [4 x 4]), pairs of "
            "them "
            "[p x 2] and the distances that the pairs must keep [p]; see collision_scene.hpp.")

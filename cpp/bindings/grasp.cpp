@@ -51,19 +51,13 @@ using Stack = py::array_t<double>;
 
 Stack stack(std::vector<py::ssize_t> shape) { return Stack(std::move(shape)); }
 
-/// Rows of X [n x configuration_size], checked.
-py::ssize_t checked_rows(const GraspSystem& system, const DoubleArray& X) {
-  if (X.ndim() != 2 || X.shape(1) != system.configuration_size())
-    throw Error("X must have " + std::to_string(system.configuration_size()) + " columns, one row for each grasp");
-  return X.shape(0);
-}
-
 constexpr py::ssize_t kGraspsBetweenSignals = 1024;  // so that Ctrl-C is heard
 
 ArrayTable grasp_arrays(GraspSystem& shared, const DoubleArray& X) {
   const Lease own(shared);
   GraspSystem& system = *own;
-  const py::ssize_t n = checked_rows(system, X), m = system.contact_count(), dof = system.object_dof();
+  const py::ssize_t n = checked_rows(X, system.configuration_size()), m = system.contact_count(),
+                    dof = system.object_dof();
   const py::ssize_t actuated = system.actuated_count();
   Stack hand_points = stack({n, m, 3}), object_points = stack({n, m, 3}), hand_normals = stack({n, m, 3}),
         object_normals = stack({n, m, 3}), J = stack({n, 3 * m, actuated}), G = stack({n, dof, 3 * m}),

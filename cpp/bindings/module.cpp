@@ -15,6 +15,12 @@ const double* checked_vector(const DoubleArray& array, pybind11::ssize_t size, c
   return array.data();
 }
 
+pybind11::ssize_t checked_rows(const DoubleArray& X, pybind11::ssize_t columns) {
+  if (X.ndim() != 2 || X.shape(1) != columns)
+    throw Error("X must have " + std::to_string(columns) + " columns, one row for each grasp");
+  return X.shape(0);
+}
+
 Reduced reduced(const pybind11::object& self, const pybind11::type& base, const pybind11::tuple& arguments) {
   return pybind11::module_::import("graspatlas.support.pickling").attr("reduced")(self, base, arguments);
 }

@@ -23,13 +23,6 @@ namespace graspatlas {
 
 namespace {
 
-/// Rows of X [n x configuration_size], checked.
-py::ssize_t checked_rows(const GraspSystem& system, const DoubleArray& X) {
-  if (X.ndim() != 2 || X.shape(1) != system.configuration_size())
-    throw Error("X must have " + std::to_string(system.configuration_size()) + " columns, one row for each grasp");
-  return X.shape(0);
-}
-
 /// `wrenches` [n x points x 3 or 6], checked: at most as many points as a hull takes, no infinite or undefined number.
 void check_wrenches(const DoubleArray& wrenches) {
   if (wrenches.ndim() != 3 || (wrenches.shape(2) != 3 && wrenches.shape(2) != 6))
@@ -70,16 +63,18 @@ py::array_t<double> evaluate_closure(GraspSystem& system, const DoubleArray& X, 
                                      double (ForceClosure::*measure)(const double*)) {
   const double* x = X.data();
   const int size = system.configuration_size();
-  return numbers_of_rows(checked_rows(system, X), [&system, x, size, friction, torsional, measure](int) {
-    auto own = std::make_shared<OwnMeasure<ForceClosure>>(system, friction, torsional);
-    return [own, x, size, measure](std::int64_t row) { return (own->measure.*measure)(x + row * size); };
-  });
+  return numbers_of_rows(
+      checked_rows(X, system.configuration_size()), [&system, x, size, friction, torsional, measure](int) {
+        auto own = std::make_shared<OwnMeasure<ForceClosure>>(system, friction, torsional);
+        return [own, x, size, measure](std::int64_t row) { return (own->measure.*measure)(x + row * size); };
+      });
 }
 
 /// Contact forces of each grasp, of total normal force one, that balance its load; see force_closure.hpp.
 ArrayTable contact_forces(GraspSystem& system, const DoubleArray& X, double friction, double torsional,
                           const std::optional<DoubleArray>& loads) {
-  const py::ssize_t n = checked_rows(system, X), m = system.contact_count(), a = system.actuated_count();
+  const py::ssize_t n = checked_rows(X, system.configuration_size()), m = system.contact_count(),
+                    a = system.actuated_count();
   const int size = system.configuration_size(), dof = system.object_dof();
   if (loads && (loads->ndim() != 2 || loads->shape(0) != n || loads->shape(1) != dof))
     throw Error("loads must have " + std::to_string(dof) + " columns, one row for each grasp");
@@ -182,7 +177,7 @@ void bind_holding_force(py::module_& module) {
       [](GraspSystem& system, const DoubleArray& X, const HoldingLimits& limits) {
         const double* x = X.data();
         const int size = system.configuration_size();
-        return numbers_of_rows(checked_rows(system, X), [&system, &limits, x, size](int) {
+        return numbers_of_rows(checked_rows(X, system.configuration_size()), [&system, &limits, x, size](int) {
           auto own = std::make_shared<OwnMeasure<HoldingForce>>(system, limits);
           return [own, x, size](std::int64_t row) { return own->measure.largest(x + row * size); };
         });
@@ -192,7 +187,8 @@ void bind_holding_force(py::module_& module) {
   module.def(
       "resisted_loads",
       [](GraspSystem& system, const DoubleArray& X, const DoubleArray& directions, const HoldingLimits& limits) {
-        const py::ssize_t n = checked_rows(system, X), axes = system.object_joint().space_dimension();
+        const py::ssize_t n = checked_rows(X, system.configuration_size()),
+                          axes = system.object_joint().space_dimension();
         if (directions.ndim() != 2 || directions.shape(0) != n || directions.shape(1) != axes)
           throw Error("directions must have " + std::to_string(axes) + " columns, one row for each grasp");
         const double *x = X.data(), *d = directions.data();
@@ -213,7 +209,7 @@ void bind_quality(py::module_& module) {
   module.def(
       "semi_axes",
       [](GraspSystem& system, const DoubleArray& X, double length_unit) {
-        const py::ssize_t n = checked_rows(system, X), dof = system.object_dof();
+        const py::ssize_t n = checked_rows(X, system.configuration_size()), dof = system.object_dof();
         py::array_t<double> out(std::vector<py::ssize_t>{n, dof});
         const double* x = X.data();
         double* axes = out.mutable_data();

@@ -34,10 +34,10 @@ std::vector<Placement> placements_from(const DoubleArray& poses) {
   return out;
 }
 
-std::shared_ptr<ReachBatch> make_batch(const Model& model, int joint, const Eigen::Matrix4d& frame,
-                                       const std::vector<double>& lower, const std::vector<double>& upper,
-                                       const CollisionBatch& scene, const std::vector<int>& arm_at,
-                                       const std::vector<int>& hand_at, int seeds, int postures) {
+std::shared_ptr<ReachBatch> make_reach_batch(const Model& model, int joint, const Eigen::Matrix4d& frame,
+                                             const std::vector<double>& lower, const std::vector<double>& upper,
+                                             const CollisionBatch& scene, const std::vector<int>& arm_at,
+                                             const std::vector<int>& hand_at, int seeds, int postures) {
   const Placement in_joint{frame.topLeftCorner<3, 3>(), frame.topRightCorner<3, 1>()};
   return std::make_shared<ReachBatch>(
       ReachScene{{model, joint, in_joint, lower, upper}, scene.shared_scene(), arm_at, hand_at, seeds, postures});
@@ -82,7 +82,7 @@ ArrayTable solve(ReachBatch& batch, const DoubleArray& targets, const DoubleArra
 void bind_reach(py::module_& module) {
   py::class_<ReachBatch, std::shared_ptr<ReachBatch>>(
       module, "ReachBatch", "An arm with a hand that looks for its postures; safe to call from any number of threads.")
-      .def(py::init(&make_batch), py::arg("model"), py::arg("joint"), py::arg("frame"), py::arg("lower"),
+      .def(py::init(&make_reach_batch), py::arg("model"), py::arg("joint"), py::arg("frame"), py::arg("lower"),
            py::arg("upper"), py::arg("scene"), py::arg("arm_at"), py::arg("hand_at"), py::arg("seeds"),
            py::arg("postures"),
            "From the arm alone, the joint that carries its frame, the frame in it [4 x 4], the limits [nq], the "

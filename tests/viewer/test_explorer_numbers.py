@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import zlib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -106,6 +107,42 @@ def test_a_closed_surface_is_torn_and_not_crushed(sphere: ga.Atlas) -> None:
     assert np.ptp(centers, axis=0).min() > 3.0  # half way round is pi
     true = np.linalg.norm(sphere.centers[i] - sphere.centers[j], axis=1)
     assert np.median(apart / true) == pytest.approx(1.0, rel=0.15)
+
+
+def changed(atlas: ga.Atlas, **others: object) -> SimpleNamespace:
+    """An atlas with other arrays."""
+    names = ("system", "radius", "n_charts", "centers", "bases", "neighbour_pairs")
+    return SimpleNamespace(**{name: getattr(atlas, name) for name in names} | others)
+
+
+def test_mirrored_tangent_bases_change_no_picture(planar_result: ga.Result) -> None:
+    atlas = planar_result.atlas
+    mirrored = np.random.default_rng(0).random(atlas.n_charts) < 0.5
+    bases = atlas.bases.copy()
+    bases[mirrored, 1] *= -1.0
+    centers, R = unrolled(atlas)
+    others, others_R = unrolled(changed(atlas, bases=bases))
+    i, j = np.random.default_rng(1).integers(0, atlas.n_charts, (2, 200))
+    apart, others_apart = (np.linalg.norm(y[i] - y[j], axis=1) for y in (centers, others))
+    np.testing.assert_allclose(others_apart, apart, atol=1e-6 * apart.max())
+    flipped = np.linalg.det(others_R) * np.linalg.det(R) < 0.0
+    assert (flipped == mirrored).all() or (flipped == ~mirrored).all()
+
+
+def test_parts_lie_beside_each_other(sphere: ga.Atlas) -> None:
+    """Two caps of a sphere, and the charts between them alone, as many parts."""
+    height, pairs = sphere.centers[:, 2], sphere.neighbour_pairs
+    caps = np.where(height > 0.6, 1, np.where(height < -0.8, -1, 0))
+    within = (caps[pairs[:, 0]] == caps[pairs[:, 1]]) & (caps[pairs[:, 0]] != 0)
+    centers, _ = unrolled(changed(sphere, neighbour_pairs=pairs[within]))
+    assert np.isfinite(centers).all()
+    for cap in (1, -1):
+        inside, outside = centers[caps == cap], centers[caps != cap]
+        nearest = np.linalg.norm(inside[:, None] - outside[None], axis=2).min()
+        assert nearest > sphere.radius
+        assert np.ptp(inside, axis=0).min() > 10.0 * sphere.radius
+    alone = centers[caps == 0]
+    assert np.linalg.norm(alone[1:] - alone[:-1], axis=1).min() > sphere.radius
 
 
 def test_functions_are_not_asked_again(small_result: ga.Result) -> None:

@@ -17,7 +17,7 @@ constexpr double kNearest = 0.8, kFarthest = 2.0;
 constexpr int kWalkSteps = 6;
 constexpr double kShortestStep = 0.05, kLongestWalkStep = 1.5;
 // How often a step that fails is halved, in a walk.
-constexpr int kHalvings = 3;
+constexpr int kWalkHalvings = 3;
 // Part of the random direction of a step beside the one that the walk has.
 constexpr double kRandomPart = 0.3;
 // How often a facet of a bound is chosen before one is not empty.
@@ -96,7 +96,7 @@ int Auditor::random_steps(Walker& walker, SplitMix64& random, std::vector<Hole>&
     random_direction(walker, random);
     double length = options_.radius * kLongestWalkStep *
                     std::pow(kShortestStep / kLongestWalkStep, random.uniform() * random.uniform());
-    if (walker.step_halving(direction_.data(), length, kHalvings) != Walker::Step::taken) {
+    if (walker.step_halving(direction_.data(), length, kWalkHalvings) != Walker::Step::taken) {
       std::fill(heading.begin(), heading.end(), 0.0);
       continue;
     }

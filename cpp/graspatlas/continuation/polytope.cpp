@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kMostDimensions = 12;
 // A vertex this little beyond a half-space (in units of offset + 1) is still inside it.
-constexpr double kOnPlane = 1e-12;
+constexpr double kOnHalfSpace = 1e-12;
 
 // Facets that two vertices have in common, if exactly k - 1 (an edge); both lists ascend.
 bool share_edge(const std::uint16_t* a, const std::uint16_t* b, int k, std::uint16_t* shared) {
@@ -174,7 +174,7 @@ bool Polytope::cut_in(const double* normal, double offset, int tag, Scratch& scr
     scratch.outside.resize(count);
   }
   double* signed_distance = scratch.signed_distance.data();
-  const double tolerance = kOnPlane * (offset + 1.0);
+  const double tolerance = kOnHalfSpace * (offset + 1.0);
   const double* u = vertices();
   double farthest = -offset;
   for (int i = 0; i < count; ++i, u += k) {

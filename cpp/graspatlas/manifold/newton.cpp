@@ -33,7 +33,7 @@ constexpr double kRankTolerance = 1e-9;
 // then they become pivots last.
 constexpr double kTangentShare = 0.1;
 // Numbers of the inverse iteration are made smaller before they overflow.
-constexpr double kLargest = 1e100;
+constexpr double kLargestNumber = 1e100;
 // A tangent vector whose squared length is below this beside the ones before it depends on them.
 constexpr double kDependent = 1e-20;
 
@@ -203,7 +203,7 @@ double Newton::regularity(int iterations) {
     before = after;
     after = 0.0;
     for (int c = 0; c < n; ++c) after += step_[c] * step_[c];
-    if (after > kLargest) {
+    if (after > kLargestNumber) {
       const double shrink = 1.0 / std::sqrt(after);
       for (int c = 0; c < n; ++c) step_[c] *= shrink;
       before /= after;

@@ -22,6 +22,19 @@ constexpr double kEnough = 1.1;        // times the least reach, beyond which a 
 
 /// Of at most six rows and columns: decompositions of one type for all spaces of disturbances, without allocation.
 using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
+
+/// Semi-axes' directions of an ellipsoid with this shape, one a column.
+Small principal_axes(const Small& shape) { return Eigen::SelfAdjointEigenSolver<Small>(shape).eigenvectors(); }
+
+SmallVector solve(const Small& A, const SmallVector& b) { return A.partialPivLu().solve(b); }
+
+/// A square matrix with orthonormal columns, whose first ones span the columns of A.
+Matrix orthonormal(const Matrix& A) {
+  Matrix Q = Matrix::Identity(A.rows(), A.rows());
+  Q.applyOnTheLeft(Eigen::HouseholderQR<Matrix>(A).householderQ());
+  return Q;
+}
 
 }  // namespace
 
@@ -98,12 +111,7 @@ void HoldingForce::set_contact(int c, const Eigen::Vector3d& center) {
 void HoldingForce::set_program(const RowMatrix& equations) {
   const Eigen::Index size = z_.size(), count = equations.rows();
   basis_.setIdentity(size, size);
-  if (count > 0) {
-    const Eigen::HouseholderQR<Matrix> qr(equations.transpose());
-    Matrix Q = Matrix::Identity(size, size);
-    Q.applyOnTheLeft(qr.householderQ());
-    basis_ = Q.rightCols(size - count);
-  }
+  if (count > 0) basis_ = orthonormal(equations.transpose()).rightCols(size - count);
   y_.noalias() = basis_.transpose() * z_;
   program_.set(basis_, cone_size_, efforts_ * basis_, std::isfinite(limits_.normal_force) ? 1.0 : kNoBudget);
 }
@@ -132,12 +140,12 @@ double HoldingForce::ball_radius(WrenchHull<D>& hull) {
   if (!program_.start(y_)) return 0.0;
   program_.center();
   y_ = program_.y();
-  const Eigen::SelfAdjointEigenSolver<Small> axes(program_.dikin_shape(reach_map_));
+  const Small axes = principal_axes(program_.dikin_shape(reach_map_));
   optima_.resize(y_.size(), std::max<Eigen::Index>(optima_.cols(), 8 * D));
   typename WrenchHull<D>::Points points(D, 2 * D);
   double least = HUGE_VAL;
   for (int i = 0; i < 2 * D; ++i) {
-    const Vector c = (i % 2 == 0 ? 1.0 : -1.0) * (reach_map_.transpose() * axes.eigenvectors().col(i / 2));
+    const Vector c = (i % 2 == 0 ? 1.0 : -1.0) * (reach_map_.transpose() * axes.col(i / 2));
     program_.start(y_);
     least = std::min(least, program_.maximize(c, kProgramShare * limits_.gap, kEnough * least).upper);
     optima_.col(i) = program_.y();
@@ -174,8 +182,7 @@ std::vector<HoldingForce::Side> HoldingForce::sides_within(const WrenchHull<D>& 
   Vector y(y_.size());
   for (const auto& side : hull.sides_within(distance)) {
     for (int k = 0; k < D; ++k) corners.col(k) = reach_map_ * optima_.col(side.corners[k]);
-    Eigen::Matrix<double, D, 1> weights = corners.partialPivLu().solve(side.normal * side.distance);
-    weights = weights.cwiseMax(0.0);
+    const SmallVector weights = solve(corners, side.normal * side.distance).cwiseMax(0.0);
     y.setZero();
     for (int k = 0; k < D; ++k) y += weights(k) / weights.sum() * optima_.col(side.corners[k]);
     sides.push_back({side.distance, side.normal, basis_ * (kSideShare * y + (1.0 - kSideShare) * y_)});
@@ -196,7 +203,7 @@ double HoldingForce::along(const double* x, const double* direction) {
   const Vector d = rotation_.topLeftCorner(directions_, directions_) * in_object;
   RowMatrix equations(dof - 1, z_.size());
   equations.topRows(torques) = wrenches_.bottomRows(torques);
-  const Matrix across = d.householderQr().householderQ();  // its first column is along d
+  const Matrix across = orthonormal(d);  // its first column is along d
   equations.bottomRows(directions_ - 1) =
       across.rightCols(directions_ - 1).transpose() * wrenches_.topRows(directions_);
   set_program(equations);

@@ -74,8 +74,8 @@ class Grasps(Light):
     @property
     def joint_positions(self) -> dict[str, Array]:
         """Position of each joint by name, [n] each [rad or m]; of a continuous joint the angle in [-pi, pi]."""
-        rows = [self.problem.hand.joint_positions(q) for q in self.q]
-        return {name: np.array([row[name] for row in rows], float) for name in self.joints}
+        columns = self.problem.hand.joint_columns(self.q)
+        return {name: columns[name] for name in self.joints}
 
     @cached_property
     def _arrays(self) -> dict[str, Array]:

@@ -280,14 +280,18 @@ class Hand(Body):
 
     def joint_positions(self, q: Array) -> dict[str, float]:
         """Position of each joint with one degree of freedom [rad or m], from q (nq,)."""
-        positions = {}
+        return {name: float(position) for name, position in self.joint_columns(q).items()}
+
+    def joint_columns(self, q: Array) -> dict[str, Array]:
+        """The same of many joint configurations q (..., nq): (...) of each joint."""
+        columns = {}
         for joint in self.model.hand_joints:
             at = joint.q_index
             if joint.q_size == 1:
-                positions[joint.name] = float(q[at])
+                columns[joint.name] = np.array(q[..., at], float)
             elif joint.v_size == 1:
-                positions[joint.name] = float(np.arctan2(q[at + 1], q[at]))
-        return positions
+                columns[joint.name] = np.asarray(np.arctan2(q[..., at + 1], q[..., at]))
+        return columns
 
     def configuration(self, positions: Mapping[str, float]) -> Array:
         """The joint configuration q (nq,) of joint positions by name [rad or m]; see :meth:`joint_positions`."""

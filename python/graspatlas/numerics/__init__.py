@@ -1,1 +1,1 @@
-"""Small numerics: rotations, and groups of linked things."""
+"""Small numerics: rotations, groups of linked things, and shortest ways between them."""

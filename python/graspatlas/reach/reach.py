@@ -71,8 +71,8 @@ class Reach(Light):
     @cached_property
     def positions(self) -> dict[str, Array]:
         """Position of each joint that moves the flange, by name, (n,) each [rad or m]; NaN where none was found."""
-        rows = [self.arm.robot.joint_positions(q) for q in self.q]
-        return {name: np.array([row[name] for row in rows], float) for name in self.arm.joints}
+        columns = self.arm.robot.joint_columns(self.q)
+        return {name: columns[name] for name in self.arm.joints}
 
 
 class ArmReach:

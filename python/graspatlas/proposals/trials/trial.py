@@ -170,6 +170,6 @@ def atlas_of(plan: Plan, assignment: Assignment, look: Look, max_seconds: float 
 def _motions(problem: Problem, postures: Array) -> HandMotions:
     """The hand motions of postures (n, nq), the joints in the order of the hand."""
     joints: Sequence[str] = problem.hand.joints
-    rows = [problem.hand.joint_positions(q) for q in postures]
-    samples = np.array([[row[name] for name in joints] for row in rows])
+    columns = problem.hand.joint_columns(postures)
+    samples = np.column_stack([columns[name] for name in joints])
     return HandMotions.from_samples(samples if len(samples) > 1 else np.repeat(samples, 2, axis=0), joints)

@@ -12,7 +12,7 @@ from graspatlas.support.arrays import Array
 from graspatlas.support.validation import PlainTable
 from graspatlas.viewer.explorer.numbers import Numbers
 from graspatlas.viewer.explorer.unrolled import unrolled
-from graspatlas.viewer.scene.polygons import Coordinates, chart_polygons, default_coordinates
+from graspatlas.viewer.scene.polygons import Coordinates, chart_polygons, default_coordinates, polygon_corners
 
 __all__ = ["Layout"]
 
@@ -58,7 +58,7 @@ class Layout:
             numbers.add("corner_counts", np.array([len(polygon) for polygon in polygons], np.uint16))
             numbers.add_rounded("corners", np.concatenate(polygons))
             centers, R = self.unrolled
-            flat = [centers[i] + atlas.polytope(i) @ R[i].T for i in range(atlas.n_charts)]
-            numbers.add_rounded("flat_corners", np.concatenate(flat))
+            corners, owners = polygon_corners(atlas)
+            numbers.add_rounded("flat_corners", centers[owners] + np.einsum("vij,vj->vi", R[owners], corners))
             numbers.add_rounded("flat_centers", centers)
         return {"labels": [re.sub(r"\$(\w)_?(\w*)\$", r"\1\2", label) for label in self.coordinates.labels]}

@@ -13,9 +13,17 @@ from graspatlas.atlas.status import Closed
 from graspatlas.errors import GraspAtlasError
 from graspatlas.grasps.grasps import Grasps
 from graspatlas.problem.problem import Problem
-from graspatlas.support.arrays import Array, BoolArray
+from graspatlas.support.arrays import Array, BoolArray, IntArray
 
-__all__ = ["Coordinates", "chart_polygons", "default_coordinates", "object_pose", "open_charts", "principal"]
+__all__ = [
+    "Coordinates",
+    "chart_polygons",
+    "default_coordinates",
+    "object_pose",
+    "open_charts",
+    "polygon_corners",
+    "principal",
+]
 
 
 @dataclass(frozen=True)
@@ -92,22 +100,32 @@ def chart_polygons(atlas: Atlas, coordinates: Coordinates) -> list[Array]:
         raise GraspAtlasError(
             f"charts are polygons when k = 2, this atlas has k = {atlas.dimension}; trace it with dimension=2"
         )
-    integrate = atlas.system.integrate
-    corners, ends = [], [0]
-    for center, basis, chart in zip(atlas.centers, atlas.bases, range(atlas.n_charts), strict=True):
-        corners += [integrate(center, v) for v in atlas.polytope(chart) @ basis]
-        ends.append(len(corners))
-    places = coordinates.of(np.array(corners))
+    corners, owners = polygon_corners(atlas)
+    integrate, centers = atlas.system.integrate, atlas.centers
+    steps = np.einsum("vk,vkt->vt", corners, atlas.bases[owners])
+    places = coordinates.of(np.array([integrate(centers[i], v) for i, v in zip(owners, steps, strict=True)]))
+    ends = atlas.vertex_start
     if not coordinates.equal:  # the third is an angle in degrees: no polygon is torn where it jumps
         for a, b in pairwise(ends):
             places[a:b, 2] = np.unwrap(places[a:b, 2], period=360.0)
     return [places[a:b] for a, b in pairwise(ends)]
 
 
+def polygon_corners(atlas: Atlas) -> tuple[Array, IntArray]:
+    """Corners of all charts of a surface in their tangent spaces [v, 2], in order round each, and their charts [v]."""
+    owners = _owners(atlas)
+    order = np.lexsort((np.arctan2(atlas.vertices[:, 1], atlas.vertices[:, 0]), owners))
+    return atlas.vertices[order], owners
+
+
 def open_charts(atlas: Atlas) -> BoolArray:
     """Which charts are under expansion: a vertex lies outside the ball, and no step from there was refused [n]."""
     beyond = (np.linalg.norm(atlas.vertices, axis=1) > atlas.radius) & (atlas.vertex_closed == Closed.OPEN.value)
-    owner = np.repeat(np.arange(atlas.n_charts), np.diff(atlas.vertex_start))
     found = np.zeros(atlas.n_charts, bool)
-    found[owner[beyond]] = True
+    found[_owners(atlas)[beyond]] = True
     return found
+
+
+def _owners(atlas: Atlas) -> IntArray:
+    """The chart of each vertex [v]."""
+    return np.repeat(np.arange(atlas.n_charts), np.diff(atlas.vertex_start))
