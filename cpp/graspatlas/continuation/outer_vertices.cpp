@@ -10,8 +10,6 @@ namespace {
 // A point is inside a half-space when it is this little beyond, as a share of the radius: more than rounding.
 constexpr double kOnPlane = 1e-11;
 
-constexpr int kMostDimensions = 12;
-
 }  // namespace
 
 void OuterVertices::begin(int k, double radius, const HalfSpaces& half_spaces) {

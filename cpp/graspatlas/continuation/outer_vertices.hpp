@@ -6,6 +6,9 @@
 
 namespace graspatlas {
 
+/// Dimensions that a polytope may have.
+constexpr int kMostDimensions = 12;
+
 /// The vertices outside a ball of a polytope round the origin in R^k, found without those inside it, of which there are
 /// many more as k grows; work space for one polytope after another.
 ///

@@ -12,7 +12,6 @@ namespace graspatlas {
 
 namespace {
 
-constexpr int kMostDimensions = 12;
 // A vertex this little beyond a half-space (in units of offset + 1) is still inside it.
 constexpr double kOnHalfSpace = 1e-12;
 
