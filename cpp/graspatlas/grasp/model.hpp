@@ -73,6 +73,10 @@ class Model {
 
  private:
   struct Pinocchio;
+
+  void make_tree();
+  void update_with_pinocchio(const double* q, bool jacobians);
+
   std::unique_ptr<Pinocchio> pinocchio_;
   std::shared_ptr<const std::string> urdf_;
   int hand_q_size_, hand_v_size_, object_joint_index_ = -1;
@@ -86,9 +90,6 @@ class Model {
   std::vector<int> all_joints_;
   JointTree tree_;
   bool has_tree_ = false;
-
-  void make_tree();
-  void update_with_pinocchio(const double* q, bool jacobians);
 };
 
 }  // namespace graspatlas
