@@ -70,7 +70,11 @@ def _run(arguments: Sequence[str] | None) -> int:
     """Run a command; its exit status."""
     try:
         words = sys.argv[1:] if arguments is None else list(arguments)
-        options = parser_for(words).parse_args(words)
+        parser = parser_for(words)
+        options, unknown = parser.parse_known_args(words)
+        if unknown:
+            parser.prog += f" {words[0]}"  # whose help lists what there is
+            parser.error(f"unrecognized arguments: {' '.join(unknown)}")
         return int(options.run(options))
     except SystemExit:  # help is printed, or a word is wrong
         finish_output()

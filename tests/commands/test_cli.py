@@ -365,6 +365,7 @@ def test_wrong_words_give_one_line(capsys):
         assert error.startswith("graspatlas: error: ")
         assert error.count("\n") == 1
         assert "--help" in error
+    assert error == "graspatlas: error: unrecognized arguments: --loud; see 'graspatlas list --help'\n"
 
 
 def test_part_of_a_name_finds_it(capsys):

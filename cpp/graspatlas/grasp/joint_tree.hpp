@@ -19,7 +19,7 @@ struct AxisJoint {
 };
 
 /// Placements and velocities of a hand's joints, all with one degree of freedom, and of an object that it does not
-/// carry; what Pinocchio computes, in less than half of the time.
+/// carry: what Pinocchio computes for joints of all kinds, and Model compares with it.
 class JointTree {
  public:
   JointTree() = default;
