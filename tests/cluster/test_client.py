@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import dask.distributed as dask
 import pytest
 
 from graspatlas.cluster.client import connected, need
-from graspatlas.cluster.local_cluster import safe_path
+from graspatlas.cluster.local_cluster import local_cluster, safe_path
 from graspatlas.errors import GraspAtlasError
 
 # Dask's own start and end on a busy machine.
@@ -20,7 +21,7 @@ pytestmark = pytest.mark.filterwarnings("ignore")
 @pytest.fixture
 def address() -> Iterator[str]:
     """A scheduler without workers."""
-    with dask.LocalCluster(n_workers=0, processes=False, dashboard_address=None) as cluster:
+    with dask.LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0") as cluster:
         yield cluster.scheduler_address
 
 
@@ -80,3 +81,17 @@ def test_local_workers_work_here_and_are_not_led_astray(tmp_path: Path, monkeypa
     assert Path(module).parent != tmp_path
     with pytest.raises(ProcessLookupError):
         os.kill(process, 0)
+
+
+def test_a_cluster_beside_another_program_s_dashboard_starts_in_silence(recwarn: pytest.WarningsRecorder) -> None:
+    with socket.socket() as other:
+        try:
+            other.bind(("0.0.0.0", 8787))  # where Dask serves unless told
+        except OSError:
+            pass  # somebody does already
+        else:
+            other.listen()
+        cluster = local_cluster(1)
+    with cluster:
+        assert cluster.scheduler.http_server.address == "127.0.0.1"
+    assert not [warning for warning in recwarn if "8787" in str(warning.message)]

@@ -30,7 +30,7 @@ at_once: list[int] = []
 def cluster() -> Iterator[dask.Client]:
     """A client of one worker with some threads in this process."""
     with (
-        dask.LocalCluster(n_workers=1, threads_per_worker=THREADS, processes=False, dashboard_address=None) as local,
+        dask.LocalCluster(n_workers=1, threads_per_worker=THREADS, processes=False, dashboard_address="127.0.0.1:0") as local,
         dask.Client(local) as client,
     ):
         yield client
@@ -120,7 +120,7 @@ def test_an_error_of_the_package_is_passed_on_as_it_is(client: dask.Client) -> N
 def test_workers_may_come_late_and_more_of_them_get_more(client: dask.Client, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("graspatlas.cluster.numbered_tasks.ASK_SECONDS", 0.1)
     with (
-        dask.LocalCluster(n_workers=0, threads_per_worker=1, processes=False, dashboard_address=None) as local,
+        dask.LocalCluster(n_workers=0, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0") as local,
         dask.Client(local) as other,
     ):
         threading.Timer(0.3, lambda: local.scale(1)).start()
@@ -135,7 +135,7 @@ def test_workers_may_come_late_and_more_of_them_get_more(client: dask.Client, mo
 
 
 def test_a_scheduler_that_goes_away_is_an_error(client: dask.Client) -> None:
-    local = dask.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None)
+    local = dask.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0")
     with dask.Client(local.scheduler_address, timeout=1.0) as other:
         results = tasks(other, noted).results(count(), NEVER)
         next(results)

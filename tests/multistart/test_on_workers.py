@@ -48,7 +48,7 @@ def alone(problem: ga.Problem) -> Refinement:
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
     """A scheduler whose workers are threads of this process: they start at once."""
-    kinds = {"threads_per_worker": 2, "processes": False, "dashboard_address": None}
+    kinds = {"threads_per_worker": 2, "processes": False, "dashboard_address": "127.0.0.1:0"}
     with dask.LocalCluster(n_workers=2, silence_logs="ERROR", **kinds) as cluster:
         yield cluster.scheduler_address
 
@@ -202,7 +202,7 @@ def test_killed_workers_lose_nothing(problem: ga.Problem) -> None:
     def kills_one_each_time(plan: Plan, first: int, deadline: float) -> Iterator[Round]:
         with (
             dask.LocalCluster(
-                n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs="CRITICAL"
+                n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs="CRITICAL"
             ) as cluster,
             dask.Client(cluster) as client,
         ):

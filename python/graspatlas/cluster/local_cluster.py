@@ -79,13 +79,17 @@ def local_cluster(workers: int) -> dask.LocalCluster:
 
     try:
         with _deaf_to_ctrl_c(), nullcontext() if KNOWS_SAFE_PATH else _empty_folder():
-            # What fails is raised to the caller; what workers say while they are closed is of no use.
+            # What fails is raised to the caller; what workers say while they are closed is of no use. Without a
+            # dashboard there is still a server, on port 8787 of all interfaces unless told: two clusters would collide.
             cluster = dask.LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs="CRITICAL"
+                n_workers=workers,
+                threads_per_worker=1,
+                silence_logs="CRITICAL",
+                scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
             )
     except RuntimeError as error:
         raise GraspAtlasError(
-            f"workers on this machine did not start ({error}): a script must start them below "
+            f"workers on this machine did not start ({error}); a script must start them below "
             'if __name__ == "__main__", since each of them imports the script'
         ) from None
     if not KNOWS_SAFE_PATH:
