@@ -30,7 +30,9 @@ at_once: list[int] = []
 def cluster() -> Iterator[dask.Client]:
     """A client of one worker with some threads in this process."""
     with (
-        dask.LocalCluster(n_workers=1, threads_per_worker=THREADS, processes=False, dashboard_address="127.0.0.1:0") as local,
+        dask.LocalCluster(
+            n_workers=1, threads_per_worker=THREADS, processes=False, dashboard_address="127.0.0.1:0"
+        ) as local,
         dask.Client(local) as client,
     ):
         yield client
