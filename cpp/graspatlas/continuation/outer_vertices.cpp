@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "graspatlas/continuation/options.hpp"
+
 namespace graspatlas {
 
 namespace {
@@ -131,6 +133,8 @@ void OuterVertices::cut_in(int half_space) {
   const double offset = half_spaces_.offsets[half_space];
   beyond_.resize(static_cast<std::size_t>(count));
   gone_.clear();
+  added_.clear();
+  free_ = reused_ = 0;
   for (int i = 0; i < count; ++i) {
     const double* u = vertex(i);
     double beyond = -offset;
@@ -140,16 +144,19 @@ void OuterVertices::cut_in(int half_space) {
   }
   // From the vertices that go, edges lead back inside. An edge of one that stays may end beyond now; if it did so
   // outside the ball, it has been gone along from there.
-  for (const int i : gone_) go_along_edges<K>(i, half_space, count);
+  for (const int i : gone_) {
+    go_along_edges<K>(i, half_space);
+    ++free_;
+  }
   for (int i = 0; i < count; ++i)
-    if (!(beyond_[i] > 0.0) && meets_ball_[i] != 0) go_along_edges<K>(i, half_space, count);
-  for (auto i = gone_.rbegin(); i != gone_.rend(); ++i) drop(*i);
+    if (!(beyond_[i] > 0.0) && meets_ball_[i] != 0) go_along_edges<K>(i, half_space);
+  for (; free_ > reused_; --free_) drop(gone_[free_ - 1]);
   enter(half_space);
 }
 
 // Finds new vertices on the edges of vertex i, where they meet the facet of a half-space.
 template <int K>
-void OuterVertices::go_along_edges(int i, int half_space, int first_new) {
+void OuterVertices::go_along_edges(int i, int half_space) {
   const int k = K > 0 ? K : k_;
   const double* normal = half_spaces_.normals + static_cast<std::ptrdiff_t>(half_space) * k;
   const double beyond = beyond_[i];
@@ -171,7 +178,6 @@ void OuterVertices::go_along_edges(int i, int half_space, int first_new) {
     std::copy_n(u, k, corner_.data());
     std::copy_n(slopes, k, slopes_.data());
     branch<K>(i, e, half_space);
-    if (!goes && !is_new(count() - 1, first_new)) drop(count() - 1);
   }
 }
 
@@ -190,28 +196,34 @@ bool OuterVertices::is_inside(const double* u) const {
 }
 
 // Adds the vertex at corner_ on an edge of vertex i, where the half-space's facet takes the place of the one that the
-// edge leaves. Facets ascend.
+// edge leaves, unless it is known. Facets ascend.
 template <int K>
 void OuterVertices::branch(int i, int edge, int half_space) {
-  const int k = K > 0 ? K : k_, added = add_vertex();
-  std::copy_n(corner_.data(), k, &positions_[at(added)]);
-  const double *from = edges(i), inverse = 1.0 / slopes_[edge];
-  double* to = edges(added);
+  const int k = K > 0 ? K : k_;
   int place = 0;
   while (place < k && (place == edge || facets(i)[place] < half_space)) ++place;
   if (place > edge) --place;
   // Column e of vertex i becomes column e, or one to the left or right of it, between the old facet and the new one.
+  const double inverse = 1.0 / slopes_[edge];
   double shares[K > 0 ? K : kMostDimensions];
   int source[K > 0 ? K : kMostDimensions];
+  FacetIndex new_facets[K > 0 ? K : kMostDimensions];
   for (int e = 0; e < k; ++e) source[e] = e;
   for (int e = edge; e < place; ++e) source[e] = e + 1;
   for (int e = edge; e > place; --e) source[e] = e - 1;
   source[place] = edge;
   for (int e = 0; e < k; ++e) {
     shares[e] = slopes_[source[e]] * inverse;
-    facets_[at(added) + e] = facets(i)[source[e]];
+    new_facets[e] = facets(i)[source[e]];
   }
-  facets_[at(added) + place] = static_cast<FacetIndex>(half_space);
+  new_facets[place] = static_cast<FacetIndex>(half_space);
+  // Two vertices that stay may have an edge, and find the same.
+  if (!(beyond_[i] > 0.0) && is_known(new_facets)) return;
+  const int added = room_for_vertex();
+  std::copy_n(corner_.data(), k, &positions_[at(added)]);
+  std::copy_n(new_facets, k, &facets_[at(added)]);
+  const double* const from = edges(i);
+  double* const to = edges(added);
   for (int c = 0; c < k; ++c) {
     const double along = from[c * k + edge];
     for (int e = 0; e < k; ++e) to[c * k + e] = from[c * k + source[e]] - shares[e] * along;
@@ -220,11 +232,23 @@ void OuterVertices::branch(int i, int edge, int half_space) {
   measure<K>(added);
 }
 
-// Whether no other vertex from `first` on has the facets of vertex i.
-bool OuterVertices::is_new(int i, int first) const {
-  for (int other = first; other < count(); ++other)
-    if (other != i && std::equal(facets(i), facets(i) + k_, facets(other))) return false;
-  return true;
+// Whether a vertex that was added with the half-space has these facets.
+bool OuterVertices::is_known(const FacetIndex* facets) const {
+  return std::any_of(added_.begin(), added_.end(),
+                     [&](int other) { return std::equal(facets, facets + k_, this->facets(other)); });
+}
+
+// A vertex more while a half-space cuts: in the place of one that goes, and is not needed any more, if there is any.
+int OuterVertices::room_for_vertex() {
+  int added;
+  if (reused_ < free_) {
+    added = gone_[reused_++];
+    states_[added] = 0;
+  } else {
+    added = add_vertex();
+  }
+  added_.push_back(added);
+  return added;
 }
 
 // Where the edges of vertex i meet the ball.

@@ -6,9 +6,6 @@
 
 namespace graspatlas {
 
-/// Dimensions that a polytope may have.
-constexpr int kMostDimensions = 12;
-
 /// The vertices outside a ball of a polytope round the origin in R^k, found without those inside it, of which there are
 /// many more as k grows; work space for one polytope after another.
 ///
@@ -62,12 +59,13 @@ class OuterVertices {
   template <int K>
   void cut_in(int half_space);
   template <int K>
-  void go_along_edges(int i, int half_space, int first_new);
+  void go_along_edges(int i, int half_space);
   template <int K>
   bool is_inside(const double* u) const;
   template <int K>
   void branch(int i, int edge, int half_space);
-  bool is_new(int i, int first) const;
+  bool is_known(const FacetIndex* facets) const;
+  int room_for_vertex();
   template <int K>
   void measure(int i);
   void drop(int i);
@@ -85,7 +83,10 @@ class OuterVertices {
   std::vector<FacetIndex> facets_;
   std::vector<std::uint8_t> states_, meets_ball_;
   std::vector<double> beyond_, slopes_, corner_, matrix_;
-  std::vector<int> gone_;
+  // Vertices that a half-space cuts off, of which so many are not needed any more, and so many places are taken again;
+  // and those that were added with it.
+  std::vector<int> gone_, added_;
+  int free_ = 0, reused_ = 0;
 };
 
 }  // namespace graspatlas

@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "graspatlas/continuation/options.hpp"
 #include "graspatlas/errors.hpp"
 
 namespace graspatlas {

@@ -51,18 +51,19 @@ int Polytope::find_outer(double radius, bool all, Scratch& scratch) {
   return farthest;
 }
 
-// A half-space that does not count yet: the one that a point is farthest beyond, or the first if there is no point; -1
-// when there is none.
+// A half-space that does not count yet: the one through which the way from the origin to a point leaves the polytope,
+// if the point is beyond it, or the first if there is no point; -1 when there is none.
 int Polytope::next_to_enter(const double* u, double tolerance, const std::vector<double>& offsets) const {
   int next = -1;
-  double farthest = tolerance;
+  double farthest = 0.0;
   for (int f = 0; f < facet_count_; ++f) {
     if (uses()[f] > 0) continue;
     if (!u) return f;
     double beyond = -offsets[f];
     for (int c = 0; c < k_; ++c) beyond += normal(f)[c] * u[c];
-    if (beyond > farthest) {
-      farthest = beyond;
+    // Offsets are moved outwards, so none is zero.
+    if (beyond > tolerance && beyond > farthest * offsets[f]) {
+      farthest = beyond / offsets[f];
       next = f;
     }
   }
