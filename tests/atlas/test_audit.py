@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers import slow_but
-from oracles.manifolds import Cone, Crossing, Ellipsoid, Neck, Rooms, Shells, share_missing, traced
+from oracles.manifolds import Cone, Crossing, Ellipsoid, Helicoid, Neck, Rooms, Shells, Spiral, share_missing, traced
 
 import graspatlas as ga
 from graspatlas import _core
@@ -32,6 +32,10 @@ HARD = {
     "neck of a curve": (lambda: Neck(0.02, 1), 0.1),
     "neck in three dimensions": (lambda: Neck(0.15, 3), 0.3),
     "shells 0.02": (lambda: Shells(0.02), 0.2),
+    "spiral": (lambda: Spiral(0.05), 0.2),
+    "spiral in three dimensions": (lambda: Spiral(0.07, 3), 0.3),
+    "helicoid": (lambda: Helicoid(0.05), 0.2),
+    "helicoid in three dimensions": (lambda: Helicoid(0.1, 3), 0.3),
     "corridor as wide as a chart": (lambda: Rooms(0.2), 0.2),
     "corridor half as wide": (lambda: Rooms(0.1), 0.2),
 }

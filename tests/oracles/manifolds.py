@@ -122,6 +122,56 @@ class Rooms(Known):
         return np.c_[x, y, z][z < 0.0][:count]
 
 
+class Spiral(Known):
+    """A sheet rolled up round the last axes from the middle: its winding angle is the squared distance / pitch."""
+
+    def __init__(self, pitch: float, dimension: int = 2) -> None:
+        self.sides = np.array([1.0, 1.0] + [0.3] * (dimension - 1))
+        super().__init__(dimension + 1, 1, lower=-self.sides, upper=self.sides)
+        self.pitch = pitch
+        self.x0 = np.zeros(dimension + 1)
+
+    def residual(self, x):
+        angle = (x[0] ** 2 + x[1] ** 2) / self.pitch
+        return [x[1] * np.cos(angle) - x[0] * np.sin(angle)]
+
+    def jacobian(self, x):
+        angle = (x[0] ** 2 + x[1] ** 2) / self.pitch
+        cosine, sine = np.cos(angle), np.sin(angle)
+        turned = -2.0 * (x[0] * cosine + x[1] * sine) / self.pitch
+        return np.append([turned * x[0] - sine, turned * x[1] + cosine], np.zeros(len(x) - 2))[None]
+
+    def points(self, count, rng):
+        distance = rng.uniform(-0.98, 0.98, count)
+        angle = distance**2 / self.pitch
+        along = rng.uniform(-0.98, 0.98, (count, len(self.x0) - 2)) * self.sides[2:]
+        return np.c_[distance * np.cos(angle), distance * np.sin(angle), along]
+
+
+class Helicoid(Known):
+    """A spiral staircase round the z axis, its storeys pi pitch apart."""
+
+    def __init__(self, pitch: float, dimension: int = 2) -> None:
+        self.sides = np.array([1.0, 1.0, 0.5] + [0.3] * (dimension - 2))
+        super().__init__(dimension + 1, 1, lower=-self.sides, upper=self.sides)
+        self.pitch = pitch
+        self.x0 = np.zeros(dimension + 1)
+
+    def residual(self, x):
+        return [x[0] * np.sin(x[2] / self.pitch) - x[1] * np.cos(x[2] / self.pitch)]
+
+    def jacobian(self, x):
+        cosine, sine = np.cos(x[2] / self.pitch), np.sin(x[2] / self.pitch)
+        up = (x[0] * cosine + x[1] * sine) / self.pitch
+        return np.append([sine, -cosine, up], np.zeros(len(x) - 3))[None]
+
+    def points(self, count, rng):
+        distance = rng.uniform(-0.98, 0.98, count)
+        along = rng.uniform(-0.98, 0.98, (count, len(self.x0) - 2)) * self.sides[2:]
+        angle = along[:, 0] / self.pitch
+        return np.c_[distance * np.cos(angle), distance * np.sin(angle), along]
+
+
 class Crossing(ga.System):
     """Two planes that cross along the z axis, within a box: the Jacobian is zero there."""
 

@@ -158,6 +158,8 @@ KNOWN = [
     manifolds.Shells(0.05),
     manifolds.Neck(0.05, 3),
     manifolds.Rooms(0.05),
+    manifolds.Spiral(0.3, 3),
+    manifolds.Helicoid(0.3, 3),
     manifolds.Crossing(),
     manifolds.Cone(),
 ]

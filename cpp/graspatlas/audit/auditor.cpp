@@ -65,7 +65,7 @@ bool Auditor::covers(const double* x, const double* Phi) {
 bool Auditor::covers(int slot, const double* x, const double* Phi) {
   const double *center = charts_.center(slot), *basis = charts_.basis(slot);
   system_.difference(center, x, displacement_.data());
-  const double off = project_displacement(basis, displacement_.data(), k_, n_, u_.data());
+  const double off = project_on_tangent_space(basis, displacement_.data(), k_, n_, u_.data());
   return off <= options_.epsilon * options_.epsilon &&
          charts_[slot].polytope.contains(u_.data(), kSliver * options_.radius) &&
          walker_.test().leads_to(center, basis, u_.data(), x, Phi);

@@ -19,8 +19,7 @@ Walker::Walker(System& system, const System& bounded, const AtlasOptions& option
       x_new_(x_.size()),
       Phi_new_(Phi_.size()),
       step_(n_),
-      p_(k_),
-      p_back_(k_) {}
+      beside_(n_, k_) {}
 
 void Walker::put(const double* point, const double* basis) {
   std::copy_n(point, x_.size(), x_.begin());
@@ -47,9 +46,9 @@ Walker::Step Walker::step(const double* direction, double length) {
   if (newton_.project(x_new_.data(), Phi_.data()) != Projection::converged) return Step::failed;
   if (!bounds_.inside(x_new_.data(), left_out_)) return Step::out_of_bounds;
   if (!newton_.tangent_basis(Phi_new_.data())) return Step::failed;
-  if (!test_.passes(x_.data(), Phi_.data(), x_new_.data(), Phi_new_.data(), p_.data(), p_back_.data()))
-    return Step::failed;
-  std::copy_n(test_.displacement(), n_, heading_.begin());
+  test_.put(x_new_.data(), Phi_new_.data());
+  if (!test_.passes(x_.data(), Phi_.data(), beside_)) return Step::failed;
+  heading_ = beside_.displacement;
   std::swap(x_, x_new_);
   std::swap(Phi_, Phi_new_);
   return Step::taken;

@@ -54,7 +54,8 @@ class Walker {
   Newton newton_;
   NeighbourTest test_;
   std::vector<double> x_, Phi_, heading_;
-  std::vector<double> x_new_, Phi_new_, step_, p_, p_back_;  // scratch of a step
+  std::vector<double> x_new_, Phi_new_, step_;  // scratch of a step
+  Beside beside_;
 };
 
 }  // namespace graspatlas

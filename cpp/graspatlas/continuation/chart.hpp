@@ -30,6 +30,7 @@ struct Chart {
   Polytope polytope;                ///< facets are tagged by the slots of the charts behind them
   const int* neighbours = nullptr;  ///< slots of the neighbours older than the chart itself
   int neighbour_count = 0;
+  int sure_count = 0;     ///< of these, the first, which are on one sheet with it beyond doubt
   int number = -1;        ///< in the order of the algorithm; -1 until that is settled
   ChartKey key = 0;       ///< ascends in the order of the algorithm
   double residual = 0.0;  ///< largest entry of |R| at the centre

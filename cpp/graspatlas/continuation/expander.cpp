@@ -5,6 +5,7 @@
 #include <string>
 
 #include "graspatlas/errors.hpp"
+#include "graspatlas/manifold/tangent.hpp"
 
 namespace graspatlas {
 
@@ -34,13 +35,12 @@ Expander::Expander(System& system, const AtlasOptions& options, Charts& charts)
       x_new_(x_size_),
       Phi_new_(static_cast<std::size_t>(k_) * n_),
       step_(n_),
-      p_ij_(k_),
-      p_ji_(k_),
       bound_in_chart_(k_),
       direction_(k_),
       vertex_(k_),
       embedding_(system.embedding_size()),
-      polytope_(k_, box_half_width(k_, options.radius), listed_vertices(k_)) {
+      polytope_(k_, box_half_width(k_, options.radius), listed_vertices(k_)),
+      beside_(n_, k_) {
   newton_.set_scales(&charts.scales());
   const RowMatrix& B = system.bound_normals();
   for (Eigen::Index b = 0; b < B.rows(); ++b) bound_reach_.push_back(std::sqrt(k_) * options.radius * B.row(b).norm());
@@ -172,27 +172,44 @@ Closed Expander::attempt(int i, const double* direction, double alpha) {
   if (!bounds_.inside(x_new_.data())) return Closed::bounds;
   if (!newton_.tangent_basis(Phi_new_.data())) return Closed::not_converged;
   residual_new_ = newton_.residual();
-  const double* x = charts_.center(i);
-  if (!test_.fits(x, Phi, x_new_.data(), Phi_new_.data(), p_ij_.data(), p_ji_.data())) return Closed::curvature;
+  test_.put(x_new_.data(), Phi_new_.data());
+  const double *x = charts_.center(i), longest = kLongestStep * options_.radius;
+  if (!test_.fits(x, Phi, beside_) || beside_.squared > longest * longest) return Closed::curvature;
   regularity_new_ = newton_.regularity();  // while Newton has the factorisation there
-  if (!test_.leads_back(x, Phi, x_new_.data(), Phi_new_.data(), p_ij_.data(), p_ji_.data())) return Closed::curvature;
-  const double longest = kLongestStep * options_.radius;
-  if (squared_length(test_.displacement(), n_) > longest * longest) return Closed::curvature;
+  if (!test_.leads_back(x, Phi, beside_)) return Closed::curvature;
+  reached_from_ = i;
   return Closed::open;
 }
 
-// Whether the candidate passes the tests with chart i; the images of each centre in the other's tangent space.
-bool Expander::meets(int i) {
-  return test_.passes(charts_.center(i), charts_.basis(i), x_new_.data(), Phi_new_.data(), p_ij_.data(), p_ji_.data());
+// Whether the candidate fits chart i.
+bool Expander::fits(int i) { return test_.fits(charts_.center(i), charts_.basis(i), beside_); }
+
+// Whether the candidate is on one sheet with chart i, which it fits. They are if both are on one sheet with a third
+// chart beyond doubt; else projections tell.
+bool Expander::on_one_sheet(int i) {
+  return i == reached_from_ || share_sure_neighbour(i) ||
+         test_.leads_back(charts_.center(i), charts_.basis(i), beside_);
+}
+
+// Whether a chart that the candidate has met is a neighbour of chart i, both beyond doubt.
+bool Expander::share_sure_neighbour(int i) const {
+  const auto is_sure = [&](int younger, int older) {
+    const Chart& chart = charts_[younger];
+    const int* const end = chart.neighbours + chart.sure_count;
+    return std::find(chart.neighbours, end, older) != end;
+  };
+  return std::any_of(neighbours_.begin(), neighbours_.begin() + sure_count_,
+                     [&](int m) { return is_sure(m, i) || is_sure(i, m); });
 }
 
 // Marks charts within which the Jacobian loses rank: between two it does where its determinant beside their bases
 // changes sign; it may where its regularity falls to zero within a radius, at the rate at which it falls between the
 // two.
-void Expander::compare_regularity(int i, int j, double distance) {
+void Expander::compare_regularity(int i, int j) {
+  const double distance = std::sqrt(beside_.squared);
   Chart &one = charts_[i], &other = charts_[j];
   const double a = std::abs(one.regularity), b = std::abs(other.regularity);
-  const bool turned = determinant_negative(test_.bases_product(), k_);
+  const bool turned = test_.turned(beside_);
   Chart& less = a < b ? one : other;
   if (((one.regularity < 0.0) != (other.regularity < 0.0)) != turned)
     less.rank = Rank::lost;
@@ -215,6 +232,7 @@ void Expander::add_chart(ChartKey key) {
   chart.polytope = polytope_;
   chart.neighbours = keep(neighbours_);
   chart.neighbour_count = static_cast<int>(neighbours_.size());
+  chart.sure_count = sure_count_;
   polytope_bytes_ += chart.polytope.bytes();
   list_bytes_ += static_cast<std::int64_t>(neighbours_.size() * sizeof(int));
   charts_.publish(j, embedding_.data());
@@ -246,32 +264,50 @@ void Expander::find_near() {
   for (std::size_t a = 0; a < near_.size(); ++a) near_[a] = sorted_[a].second;
 }
 
-// Eq (16) and Fig. 6b: two charts of equal radius cut each other at the bisector of the centre and the
-// other's image.
+// Charts that the candidate is on one sheet with beyond doubt come first, since they help to tell for others.
 void Expander::meet_neighbours(int j) {
+  test_.put(x_new_.data(), Phi_new_.data());
   find_near();
   neighbours_.clear();
+  std::size_t doubtful = 0;
   for (const int i : near_) {
-    if (!meets(i)) continue;
-    const double squared_ij = squared_length(p_ij_.data(), k_), squared_ji = squared_length(p_ji_.data(), k_);
-    if (!(squared_ij > 0.0) || !(squared_ji > 0.0)) continue;
-    compare_regularity(i, j, std::sqrt(squared_length(test_.displacement(), n_)));
-    const double norm_ij = std::sqrt(squared_ij), norm_ji = std::sqrt(squared_ji);
-    for (int a = 0; a < k_; ++a) {
-      p_ij_[a] /= norm_ij;
-      p_ji_[a] /= norm_ji;
+    if (!fits(i)) continue;
+    if (test_.beyond_doubt(beside_)) {
+      meet(i, j);
+      continue;
     }
-    Polytope& other = charts_[i].polytope;
-    polytope_bytes_ -= other.bytes();
-    other.cut(p_ij_.data(), 0.5 * norm_ij, j, cut_scratch_);
-    polytope_bytes_ += other.bytes();
-    if (charts_[i].closed && other.expandable_vertex(options_.radius, cut_scratch_) >= 0 && charts_[i].done) {
-      charts_[i].done = false;
-      reopened_.push_back(i);
-    }
-    polytope_.cut(p_ji_.data(), 0.5 * norm_ji, i, cut_scratch_);
-    neighbours_.push_back(i);
+    if (doubtful == doubtful_.size()) doubtful_.emplace_back(i, Beside(n_, k_));
+    doubtful_[doubtful].first = i;
+    std::swap(doubtful_[doubtful++].second, beside_);
   }
+  sure_count_ = static_cast<int>(neighbours_.size());
+  for (std::size_t d = 0; d < doubtful; ++d) {
+    std::swap(doubtful_[d].second, beside_);
+    if (on_one_sheet(doubtful_[d].first)) meet(doubtful_[d].first, j);
+  }
+  reached_from_ = -1;
+}
+
+// Eq (16) and Fig. 6b: two charts of equal radius cut each other at the bisector of the centre and the other's image.
+void Expander::meet(int i, int j) {
+  double *const p_ij = beside_.p_ij.data(), *const p_ji = beside_.p_ji.data();
+  const double norm_ij = std::sqrt(squared_length(p_ij, k_)), norm_ji = std::sqrt(squared_length(p_ji, k_));
+  if (!(norm_ij > 0.0) || !(norm_ji > 0.0)) return;
+  compare_regularity(i, j);
+  for (int a = 0; a < k_; ++a) {
+    p_ij[a] /= norm_ij;
+    p_ji[a] /= norm_ji;
+  }
+  Polytope& other = charts_[i].polytope;
+  polytope_bytes_ -= other.bytes();
+  other.cut(p_ij, 0.5 * norm_ij, j, cut_scratch_);
+  polytope_bytes_ += other.bytes();
+  if (charts_[i].closed && other.expandable_vertex(options_.radius, cut_scratch_) >= 0 && charts_[i].done) {
+    charts_[i].done = false;
+    reopened_.push_back(i);
+  }
+  polytope_.cut(p_ji, 0.5 * norm_ji, i, cut_scratch_);
+  neighbours_.push_back(i);
 }
 
 // A copy of the list that stays where it is.

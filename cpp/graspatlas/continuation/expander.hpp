@@ -61,8 +61,11 @@ class Expander {
   void cut_by_bounds(int j);
   void meet_neighbours(int j);
   void find_near();
-  bool meets(int i);
-  void compare_regularity(int i, int j, double distance);
+  bool fits(int i);
+  bool on_one_sheet(int i);
+  bool share_sure_neighbour(int i) const;
+  void meet(int i, int j);
+  void compare_regularity(int i, int j);
   const int* keep(const std::vector<int>& list);
 
   System& system_;
@@ -80,12 +83,16 @@ class Expander {
   // Scratch: the candidate chart and its polytope, and work space of the tests.
   double residual_new_ = 0.0, regularity_new_ = 1.0;
   std::vector<double> bound_reach_;  // slack from which on a bound cuts no chart
-  std::vector<double> x_new_, Phi_new_, step_, p_ij_, p_ji_, bound_in_chart_, direction_, vertex_, embedding_;
+  std::vector<double> x_new_, Phi_new_, step_, bound_in_chart_, direction_, vertex_, embedding_;
   std::vector<double> slacks_new_;
   Polytope polytope_;
   Polytope::Scratch cut_scratch_;
   Neighbours::Scratch near_scratch_;
+  Beside beside_;  // of the candidate and a chart
   std::vector<int> near_, neighbours_, reopened_;
+  int sure_count_ = 0, reached_from_ = -1;  // of neighbours_, the first; the chart that led to the candidate, if any
+  // Charts that the candidate fits, but may be on another sheet than.
+  std::vector<std::pair<int, Beside>> doubtful_;
   std::vector<std::pair<ChartKey, int>> sorted_;
 };
 

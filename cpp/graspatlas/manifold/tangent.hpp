@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 
 namespace graspatlas {
@@ -29,6 +30,12 @@ inline void tangent_coordinates(const double* Phi, const double* v, int k, int n
     for (int c = 0; c < n; ++c) dot += row[c] * v[c];
     u[a] = dot;
   }
+}
+
+/// The same; returns the squared distance of v from the tangent space.
+inline double project_on_tangent_space(const double* Phi, const double* v, int k, int n, double* u) {
+  tangent_coordinates(Phi, v, k, n, u);
+  return std::max(squared_length(v, n) - squared_length(u, k), 0.0);
 }
 
 }  // namespace graspatlas
