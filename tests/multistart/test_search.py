@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 import graspatlas as ga
 from graspatlas.cli import main
@@ -153,6 +154,16 @@ def test_an_interrupted_search_keeps_what_it_has_and_goes_on(problem: ga.Problem
         Search(plan, 0.01, tmp_path / "rounds", False).run(starts, None)
     RoundFolder.remove(tmp_path / "rounds")
     assert not (tmp_path / "rounds").exists()
+
+
+def test_rounds_of_a_mesh_that_was_saved_anew_are_of_another_search(problem: ga.Problem, tmp_path: Path) -> None:
+    stone = tmp_path / "stone.stl"
+    trimesh.creation.box((0.02, 0.02, 0.02)).export(stone)
+    plan = plan_of(replace(problem, obstacles=(ga.Obstacle.mesh("stone", stone),)))
+    before = RoundFolder(tmp_path, plan).digest
+    assert RoundFolder(tmp_path, plan).digest == before
+    trimesh.creation.box((0.02, 0.02, 0.03)).export(stone)
+    assert RoundFolder(tmp_path, plan).digest != before
 
 
 def test_the_limit_of_time_cuts_it_short(problem: ga.Problem) -> None:

@@ -108,6 +108,17 @@ def test_a_folder_of_other_arguments_is_refused(can_file: Path, output: Path, pr
         ga.propose(HAND, can_file, output, links=LINKS, top=1, seed=5)
 
 
+def test_looks_of_an_obstacle_that_was_saved_anew_are_refused(can_file: Path, tmp_path: Path) -> None:
+    stone = tmp_path / "stone.stl"
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(stone)
+    obstacles = [ga.Obstacle.mesh("stone", stone, frame="object", pose=ga.Pose((1.0, 0.0, 0.0)))]
+    words = {"links": LINKS, "top": 1, "max_seconds": 3.0, "obstacles": obstacles}
+    assert ga.propose(HAND, can_file, tmp_path / "out", **words).tried
+    trimesh.creation.box((0.1, 0.1, 0.2)).export(stone)
+    with pytest.raises(ga.GraspAtlasError, match="of another problem, of other options"):
+        ga.propose(HAND, can_file, tmp_path / "out", **words)
+
+
 def test_time_ends_it_with_what_there_is(can_file: Path, tmp_path: Path) -> None:
     found = ga.propose(HAND, can_file, tmp_path, links=LINKS, top=1, max_seconds=0.01)
     assert found.status == ga.ProposalsEnd.TIME_LIMIT

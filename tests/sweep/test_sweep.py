@@ -8,14 +8,17 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+import trimesh
 
 import graspatlas as ga
 from graspatlas.cli import main
 from graspatlas.sweep import ROWS, Run, run_sweep
+from graspatlas.sweep.runs import runs_of
 
 # Dask's own start and end on a busy machine.
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -77,6 +80,20 @@ def test_a_run_is_known_by_its_content() -> None:
     assert run.key == Run("copy.json", json.loads(json.dumps(problem)), radius=0.2).key
     assert run.key != Run("planar_hand", problem, radius=0.21).key
     assert run.key != Run("planar_hand", {**problem, "length_scale": 0.2}, radius=0.2).key
+
+
+def test_a_mesh_that_was_saved_anew_makes_a_run_new(tmp_path: Path) -> None:
+    stone, file = tmp_path / "stone.stl", tmp_path / "problem.json"
+    trimesh.creation.box((0.02, 0.02, 0.02)).export(stone)
+    problem = replace(ga.load_problem("planar_hand"), obstacles=(ga.Obstacle.mesh("stone", stone),))
+    file.write_text(json.dumps(problem.to_dict()))
+    choices = [(1, 0.2, 0.5, None)]
+    (before,), (same,) = (runs_of(str(file), Run("", None), choices) for _ in range(2))
+    assert same.key == before.key
+    trimesh.creation.box((0.02, 0.02, 0.03)).export(stone)
+    (after,) = runs_of(str(file), Run("", None), choices)
+    assert after.problem == before.problem
+    assert after.key != before.key
 
 
 @pytest.mark.slow

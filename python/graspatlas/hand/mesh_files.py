@@ -1,7 +1,9 @@
-"""Mesh files of a URDF, looked at before a collision library does: that one takes NaN for a place."""
+"""Mesh files of a URDF: looked at before a collision library does, which takes NaN for a place, and known again."""
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
@@ -18,7 +20,7 @@ from graspatlas.support.arrays import Array
 if TYPE_CHECKING:
     from graspatlas.hand.body import Body
 
-__all__ = ["check_meshes", "mesh_corners"]
+__all__ = ["check_meshes", "mesh_corners", "meshes_digest"]
 
 #: Before the triangles of a binary STL file: a header, and their number [bytes].
 _STL_HEADER = 84
@@ -35,11 +37,28 @@ def check_meshes(body: Body) -> None:
     Raises:
         GraspAtlasError: If one holds a number that is not finite, or nothing but a point or a line.
     """
+    for path in _paths(body):
+        _check(body.name, path)
+
+
+def meshes_digest(bodies: Iterable[Body]) -> str:
+    """SHA-256 of the mesh files that the URDFs of bodies name, by which a file that was saved anew is told.
+
+    Args:
+        bodies: The bodies; files that are not there are passed over.
+
+    Returns:
+        Nothing where there are no files.
+    """
+    digests = [hashlib.sha256(path.read_bytes()).digest() for body in bodies for path in _paths(body)]
+    return hashlib.sha256(b"".join(digests)).hexdigest() if digests else ""
+
+
+def _paths(body: Body) -> list[Path]:
+    """The mesh files of a body that are there, in the order of their names."""
     folders = mesh_folders(body)
-    for name in sorted({str(mesh.get("filename")) for mesh in ElementTree.fromstring(body.urdf).iter("mesh")}):
-        path = _path(name, folders)
-        if path is not None:
-            _check(body.name, path)
+    names = sorted({str(mesh.get("filename")) for mesh in ElementTree.fromstring(body.urdf).iter("mesh")})
+    return [path for name in names if (path := _path(name, folders)) is not None]
 
 
 def _path(name: str, folders: tuple[str, ...]) -> Path | None:

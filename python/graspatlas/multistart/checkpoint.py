@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 
+from graspatlas.hand.mesh_files import meshes_digest
 from graspatlas.multistart.rounds import Plan, Round, RoundKind
 from graspatlas.problem.requirement import StatedRequirement
 from graspatlas.quality.batched import quality_name
@@ -42,6 +43,8 @@ class RoundFolder:
         self.folder = stated_path(folder, "keep a checkpoint at")
         stated = {field.name: getattr(plan, field.name) for field in fields(plan) if field.name != "threads"}
         stated["problem"] = plan.problem.to_dict()
+        if meshes := meshes_digest(plan.problem.bodies):
+            stated["meshes"] = meshes
         stated["quality"] = quality_name(plan.quality)
         stated["requirements"] = [_stated(requirement) for requirement in plan.requirements]
         # Functions that share a name differ in what they say of a grasp.

@@ -174,6 +174,12 @@ class Problem(Light, Displayed):
         check_freedom(self.name, self.hand, self.contacts, self.object_joint_model)
         return self._system(self.hand.mechanism.transmission)
 
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """All that is stated by URDF: hand, object, obstacles that are no planes, and the arm."""
+        obstacles = [obstacle.body for obstacle in self.obstacles if obstacle.body is not None]
+        return (self.hand, self.object, *obstacles, *(() if self.arm is None else (self.arm.robot,)))
+
     @cached_property
     def joint_units(self) -> Array:
         """Joint velocity that counts as one (nv,): a radian, or length_scale for prismatic joints."""

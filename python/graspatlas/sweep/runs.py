@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from graspatlas.errors import GraspAtlasError
+from graspatlas.hand.mesh_files import meshes_digest
 from graspatlas.problems import load_problem
 from graspatlas.support.validation import PlainTable
 from graspatlas.sweep.rows import COLUMNS, Row
@@ -26,6 +27,7 @@ class Run:
         problem: The problem as plain data; None when it could not be loaded.
         error: Why it could not be loaded; empty otherwise.
         dimension, radius, epsilon, quality, require, refine, max_charts, max_seconds: See :func:`graspatlas.optimize`.
+        meshes: Digest of the mesh files that the problem names, if any.
     """
 
     file: str
@@ -39,11 +41,14 @@ class Run:
     refine: bool = False
     max_charts: int | None = None
     max_seconds: float | None = None
+    meshes: str = ""
 
     @property
     def key(self) -> str:
         """Digest of the problem and the options, by which a finished run is known again."""
         content = {**asdict(self), "file": self.file if self.problem is None else ""}
+        if not self.meshes:
+            del content["meshes"]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
     def row(self, **values: object) -> Row:
@@ -61,11 +66,11 @@ def runs_of(file: str, fixed: Run, choices: Sequence[Sequence[int | float | str 
     except GraspAtlasError as error:
         yield replace(fixed, file=file, error=str(error))
         return
-    data = problem.to_dict()
+    data, meshes = problem.to_dict(), meshes_digest(problem.bodies)
     for choice in choices:
         names = ("dimension", "radius", "epsilon", "quality")
         options: dict[str, Any] = {
             name: problem.defaults.get(name) if value is None else value
             for name, value in zip(names, choice, strict=True)
         }
-        yield replace(fixed, file=file, problem=data, **options)
+        yield replace(fixed, file=file, problem=data, meshes=meshes, **options)

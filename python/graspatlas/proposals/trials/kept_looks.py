@@ -7,6 +7,8 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
+from graspatlas.hand.body import Body
+from graspatlas.hand.mesh_files import meshes_digest
 from graspatlas.problem.requirement import StatedRequirement
 from graspatlas.proposals.assignments.matching import Assignment
 from graspatlas.proposals.plan import Plan
@@ -18,7 +20,7 @@ from graspatlas.storage.run_files import damaged, read_run_file, write_run_file
 __all__ = ["KeptLooks"]
 
 #: Changes when a look of an older version would not be the same.
-VERSION = 2
+VERSION = 3
 _KINDS = {"end": "U", "why": "U", "lack": "U", "value": "f", "x": "f", "postures": "f"}
 
 
@@ -45,6 +47,7 @@ class KeptLooks:
             plan.length_scale,
             plan.seed,
             [obstacle.to_dict() for obstacle in plan.obstacles],
+            meshes_digest(_bodies(plan, assignments)),
             [(each.name, each.score, each.fingers.hand.urdf) for each in assignments],
         ]
         stated_all = all(isinstance(requirement, StatedRequirement) for requirement in plan.requirements)
@@ -81,3 +84,9 @@ class KeptLooks:
 
     def _path(self, number: int) -> Path:
         return self.folder / f"{number:05}.npz"
+
+
+def _bodies(plan: Plan, assignments: Sequence[Assignment]) -> list[Body]:
+    """What may touch: the hand, which is the same in all assignments, and obstacles that are no planes."""
+    hands = [each.fingers.hand for each in assignments[:1]]
+    return [*hands, *(obstacle.body for obstacle in plan.obstacles if obstacle.body is not None)]
