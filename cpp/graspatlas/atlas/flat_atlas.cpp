@@ -67,7 +67,7 @@ void copy_chart(const Atlas& atlas, std::int64_t i, const FlatStarts& starts, co
   copy_vertices(p, starts.vertices[i], out);
   std::int32_t* pair = out.neighbour_pairs + 2 * starts.neighbours[i];
   for (int c = 0; c < chart.neighbour_count; ++c) {
-    *pair++ = atlas.number(chart.neighbours[c]);
+    *pair++ = atlas.number(chart.neighbours[c].slot);
     *pair++ = static_cast<std::int32_t>(i);
   }
 }

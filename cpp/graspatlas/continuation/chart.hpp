@@ -25,12 +25,17 @@ constexpr Polytope::Listed listed_vertices(int dimension) {
   return dimension <= 3 ? Polytope::Listed::all : Polytope::Listed::outer;
 }
 
+/// Another chart that a chart cuts, and is cut by.
+struct Neighbour {
+  int slot;
+  float squared_mismatch;  ///< NeighbourTest: how far the two are from lying on one sheet, as far as they say
+};
+
 /// A chart: what it covers of its tangent space, and what is known of it. Its centre and tangent basis are in `Charts`.
 struct Chart {
-  Polytope polytope;                ///< facets are tagged by the slots of the charts behind them
-  const int* neighbours = nullptr;  ///< slots of the neighbours older than the chart itself
+  Polytope polytope;                      ///< facets are tagged by the slots of the charts behind them
+  const Neighbour* neighbours = nullptr;  ///< those older than the chart itself
   int neighbour_count = 0;
-  int sure_count = 0;     ///< of these, the first, which are on one sheet with it beyond doubt
   int number = -1;        ///< in the order of the algorithm; -1 until that is settled
   ChartKey key = 0;       ///< ascends in the order of the algorithm
   double residual = 0.0;  ///< largest entry of |R| at the centre

@@ -17,7 +17,9 @@ constexpr double kShrink = 0.9;
 constexpr double kMostShrink = 0.4;
 // A vertex is closed when alpha falls below this share of the radius.
 constexpr double kSmallestStep = 0.05;
-// Numbers in a block of lists of neighbours.
+// A third chart tells that two are on one sheet when its mismatch with each is at most this share of theirs.
+constexpr double kShare = 0.25;
+// Entries in a block of lists of neighbours.
 constexpr std::size_t kListBlock = 1 << 16;
 
 }  // namespace
@@ -184,22 +186,25 @@ Closed Expander::attempt(int i, const double* direction, double alpha) {
 // Whether the candidate fits chart i.
 bool Expander::fits(int i) { return test_.fits(charts_.center(i), charts_.basis(i), beside_); }
 
-// Whether the candidate is on one sheet with chart i, which it fits. They are if both are on one sheet with a third
-// chart beyond doubt; else projections tell.
+// Whether the candidate is on one sheet with chart i, which it fits: where that is in doubt, by a chart that both are
+// neighbours of, or else by projections.
 bool Expander::on_one_sheet(int i) {
-  return i == reached_from_ || share_sure_neighbour(i) ||
+  return i == reached_from_ || test_.beyond_doubt(beside_) || share_neighbour(i) ||
          test_.leads_back(charts_.center(i), charts_.basis(i), beside_);
 }
 
-// Whether a chart that the candidate has met is a neighbour of chart i, both beyond doubt.
-bool Expander::share_sure_neighbour(int i) const {
-  const auto is_sure = [&](int younger, int older) {
+// Whether a third chart is a neighbour of both with so small mismatches that no other sheet, as far away as the
+// mismatch of the two would have it, can lie between.
+bool Expander::share_neighbour(int i) const {
+  const double most = kShare * kShare * beside_.squared_mismatch;
+  const auto are = [&](int younger, int older) {
     const Chart& chart = charts_[younger];
-    const int* const end = chart.neighbours + chart.sure_count;
-    return std::find(chart.neighbours, end, older) != end;
+    return std::any_of(chart.neighbours, chart.neighbours + chart.neighbour_count,
+                       [&](const Neighbour& other) { return other.slot == older && other.squared_mismatch <= most; });
   };
-  return std::any_of(neighbours_.begin(), neighbours_.begin() + sure_count_,
-                     [&](int m) { return is_sure(m, i) || is_sure(i, m); });
+  return std::any_of(neighbours_.begin(), neighbours_.end(), [&](const Neighbour& third) {
+    return third.squared_mismatch <= most && (are(third.slot, i) || are(i, third.slot));
+  });
 }
 
 // Marks charts within which the Jacobian loses rank: between two it does where its determinant beside their bases
@@ -232,9 +237,8 @@ void Expander::add_chart(ChartKey key) {
   chart.polytope = polytope_;
   chart.neighbours = keep(neighbours_);
   chart.neighbour_count = static_cast<int>(neighbours_.size());
-  chart.sure_count = sure_count_;
   polytope_bytes_ += chart.polytope.bytes();
-  list_bytes_ += static_cast<std::int64_t>(neighbours_.size() * sizeof(int));
+  list_bytes_ += static_cast<std::int64_t>(neighbours_.size() * sizeof(Neighbour));
   charts_.publish(j, embedding_.data());
 }
 
@@ -264,7 +268,7 @@ void Expander::find_near() {
   for (std::size_t a = 0; a < near_.size(); ++a) near_[a] = sorted_[a].second;
 }
 
-// Charts that the candidate is on one sheet with beyond doubt come first, since they help to tell for others.
+// Charts that the candidate is on one sheet with beyond doubt come first, since they tell of others.
 void Expander::meet_neighbours(int j) {
   test_.put(x_new_.data(), Phi_new_.data());
   find_near();
@@ -280,7 +284,6 @@ void Expander::meet_neighbours(int j) {
     doubtful_[doubtful].first = i;
     std::swap(doubtful_[doubtful++].second, beside_);
   }
-  sure_count_ = static_cast<int>(neighbours_.size());
   for (std::size_t d = 0; d < doubtful; ++d) {
     std::swap(doubtful_[d].second, beside_);
     if (on_one_sheet(doubtful_[d].first)) meet(doubtful_[d].first, j);
@@ -307,17 +310,17 @@ void Expander::meet(int i, int j) {
     reopened_.push_back(i);
   }
   polytope_.cut(p_ji, 0.5 * norm_ji, i, cut_scratch_);
-  neighbours_.push_back(i);
+  neighbours_.push_back({i, static_cast<float>(std::max(beside_.squared_mismatch, 0.0))});
 }
 
 // A copy of the list that stays where it is.
-const int* Expander::keep(const std::vector<int>& list) {
+const Neighbour* Expander::keep(const std::vector<Neighbour>& list) {
   if (list.size() > list_room_) {
     list_room_ = std::max(kListBlock, list.size());
-    lists_.emplace_back(new int[list_room_]);
+    lists_.emplace_back(new Neighbour[list_room_]);
     next_list_ = lists_.back().get();
   }
-  int* const copy = next_list_;
+  Neighbour* const copy = next_list_;
   std::copy(list.begin(), list.end(), copy);
   next_list_ += list.size();
   list_room_ -= list.size();

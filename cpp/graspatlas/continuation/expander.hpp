@@ -63,10 +63,10 @@ class Expander {
   void find_near();
   bool fits(int i);
   bool on_one_sheet(int i);
-  bool share_sure_neighbour(int i) const;
+  bool share_neighbour(int i) const;
   void meet(int i, int j);
   void compare_regularity(int i, int j);
-  const int* keep(const std::vector<int>& list);
+  const Neighbour* keep(const std::vector<Neighbour>& list);
 
   System& system_;
   AtlasOptions options_;
@@ -76,9 +76,9 @@ class Expander {
   NeighbourTest test_;
   BoundCheck bounds_;
   std::int64_t projections_ = 0, polytope_bytes_ = 0, list_bytes_ = 0;
-  std::vector<std::unique_ptr<int[]>> lists_;  // of neighbours, one after another
-  int* next_list_ = nullptr;                   // where the next goes
-  std::size_t list_room_ = 0;                  // left there
+  std::vector<std::unique_ptr<Neighbour[]>> lists_;  // of neighbours, one after another
+  Neighbour* next_list_ = nullptr;                   // where the next goes
+  std::size_t list_room_ = 0;                        // left there
 
   // Scratch: the candidate chart and its polytope, and work space of the tests.
   double residual_new_ = 0.0, regularity_new_ = 1.0;
@@ -89,8 +89,9 @@ class Expander {
   Polytope::Scratch cut_scratch_;
   Neighbours::Scratch near_scratch_;
   Beside beside_;  // of the candidate and a chart
-  std::vector<int> near_, neighbours_, reopened_;
-  int sure_count_ = 0, reached_from_ = -1;  // of neighbours_, the first; the chart that led to the candidate, if any
+  std::vector<int> near_, reopened_;
+  std::vector<Neighbour> neighbours_;
+  int reached_from_ = -1;  // the chart that led to the candidate, if any
   // Charts that the candidate fits, but may be on another sheet than.
   std::vector<std::pair<int, Beside>> doubtful_;
   std::vector<std::pair<ChartKey, int>> sorted_;

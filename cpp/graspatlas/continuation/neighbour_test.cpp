@@ -12,8 +12,9 @@ namespace graspatlas {
 
 namespace {
 
-// Two charts that are more doubtful than this are neighbours only if the newer leads to the older, and each to the
-// other in grave doubt: see squared_sheet_doubt. Charts of smooth manifolds are mostly below a hundredth.
+// Doubt is the mismatch as a share of the displacement. Two charts that are more doubtful than this are neighbours only
+// if the newer leads to the older, and each to the other in grave doubt. Charts of smooth manifolds are mostly below a
+// hundredth.
 constexpr double kDoubt = 0.05, kGraveDoubt = 0.2;
 // A projection from one chart leads to another when it comes as near as this to its centre, and to its tangent space,
 // as shares of the displacement. The first is for the curvature of the configuration space, where coordinates above one
@@ -78,14 +79,13 @@ bool tangent_spaces_agree(const double* M, int dimension, double cosine, double*
   return true;
 }
 
-// How doubtful it is that two charts lie on one sheet: how far d is from the sum of its parts in the two tangent spaces
-// that the trapezoidal rule expects, beside |d|. On one sheet the offsets of d from the tangent spaces at its two ends
-// are opposite, but for third derivatives; from one sheet to another they add up to twice the sheets' distance. Returns
-// the square of that share; below zero only by rounding.
+// How far d is from the sum of its parts in two tangent spaces that the trapezoidal rule expects, squared. On one sheet
+// the offsets of d from the tangent spaces at its two ends are opposite, but for third derivatives; from one sheet to
+// another they add up to twice the sheets' distance. Below zero only by rounding.
 //
 // p_i = Phi_i d, p_j = Phi_j d, M = Phi_i Phi_j' [k x k], squared = |d|^2 > 0.
 template <int K>
-double squared_sheet_doubt(const double* p_i, const double* p_j, const double* M, double squared, int dimension) {
+double squared_sheet_mismatch(const double* p_i, const double* p_j, const double* M, double squared, int dimension) {
   const int k = K > 0 ? K : dimension;
   double squared_i = 0.0, squared_j = 0.0, mixed = 0.0;
   for (int a = 0; a < k; ++a) {
@@ -97,8 +97,7 @@ double squared_sheet_doubt(const double* p_i, const double* p_j, const double* M
   }
   // Offsets n_i = d - Phi_i' p_i and n_j; of their sum the part along d does not count.
   const double both = 2.0 * squared - squared_i - squared_j;
-  const double sum = both + 2.0 * (squared - squared_i - squared_j + mixed) - both * both / squared;
-  return sum / squared;
+  return both + 2.0 * (squared - squared_i - squared_j + mixed) - both * both / squared;
 }
 
 }  // namespace
@@ -159,12 +158,14 @@ bool NeighbourTest::fit(const double* Phi_i, Beside& beside) {
   if (squared - squared_length(p_ij, k) > limit || squared - squared_length(p_ji, k) > limit) return false;
   multiply_bases<K>(Phi_i, by_number_.data(), k_, n_, M);
   if (!tangent_spaces_agree<K>(M, k, cosine, work_.data())) return false;
-  beside.squared_doubt = squared > 0.0 ? squared_sheet_doubt<K>(p_ij, p_ji, M, squared, k) : 0.0;
+  beside.squared_mismatch = squared > 0.0 ? squared_sheet_mismatch<K>(p_ij, p_ji, M, squared, k) : 0.0;
   for (int a = 0; a < k; ++a) p_ji[a] = -p_ji[a];
   return true;
 }
 
-bool NeighbourTest::beyond_doubt(const Beside& beside) const { return beside.squared_doubt <= kDoubt * kDoubt; }
+bool NeighbourTest::beyond_doubt(const Beside& beside) const {
+  return beside.squared_mismatch <= kDoubt * kDoubt * beside.squared;
+}
 
 // By the sign of the product's determinant.
 bool NeighbourTest::turned(const Beside& beside) {
@@ -198,7 +199,8 @@ bool NeighbourTest::turned(const Beside& beside) {
 bool NeighbourTest::leads_back(const double* x_i, const double* Phi_i, const Beside& beside) {
   // The newer chart was reached from an older one: the way back says more.
   if (!beyond_doubt(beside) && !leads_to(x_j_, Phi_j_, beside.p_ji.data(), x_i, Phi_i)) return false;
-  return beside.squared_doubt <= kGraveDoubt * kGraveDoubt || leads_to(x_i, Phi_i, beside.p_ij.data(), x_j_, Phi_j_);
+  return beside.squared_mismatch <= kGraveDoubt * kGraveDoubt * beside.squared ||
+         leads_to(x_i, Phi_i, beside.p_ij.data(), x_j_, Phi_j_);
 }
 
 bool NeighbourTest::leads_to(const double* x_i, const double* Phi_i, const double* p, const double* x_j,

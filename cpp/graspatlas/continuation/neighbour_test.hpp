@@ -17,8 +17,9 @@ struct Beside {
   std::vector<double> p_ij, p_ji;
   std::vector<double> product;  ///< Phi_i Phi_j' [k x k]
   double squared = 0.0;         ///< squared length of the displacement
-  /// Square of how doubtful it is that both lie on one sheet, as a share of the displacement: see neighbour_test.cpp.
-  double squared_doubt = 0.0;
+  /// Square of how far the displacement is from what the tangent spaces expect of points on one sheet: of two sheets it
+  /// is twice their distance. See neighbour_test.cpp.
+  double squared_mismatch = 0.0;
 };
 
 /// Whether two points of the manifold with their tangent bases are near enough to each other, and on one sheet, to be
