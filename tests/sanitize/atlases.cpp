@@ -118,7 +118,7 @@ void check(const Atlas& atlas, double radius) {
   }
   for (std::int64_t j = 0; j < atlas.count(); ++j)
     for (int a = 0; a < atlas.chart(j).neighbour_count; ++a) {
-      const int i = atlas.number(atlas.chart(j).neighbours[a]);
+      const int i = atlas.number(atlas.chart(j).neighbours[a].slot);
       require(0 <= i && i < j, "neighbours are older charts");
       system.difference(atlas.center(i), atlas.center(j), d.data());
       double squared = 0.0;
