@@ -186,11 +186,10 @@ Closed Expander::attempt(int i, const double* direction, double alpha) {
 // Whether the candidate fits chart i.
 bool Expander::fits(int i) { return test_.fits(charts_.center(i), charts_.basis(i), beside_); }
 
-// Whether the candidate is on one sheet with chart i, which it fits: where that is in doubt, by a chart that both are
+// Whether the candidate is on one sheet with chart i, which it fits, where that is in doubt: by a chart that both are
 // neighbours of, or else by projections.
 bool Expander::on_one_sheet(int i) {
-  return i == reached_from_ || test_.beyond_doubt(beside_) || share_neighbour(i) ||
-         test_.leads_back(charts_.center(i), charts_.basis(i), beside_);
+  return i == reached_from_ || share_neighbour(i) || test_.leads_back(charts_.center(i), charts_.basis(i), beside_);
 }
 
 // Whether a third chart is a neighbour of both with so small mismatches that no other sheet, as far away as the
