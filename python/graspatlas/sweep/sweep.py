@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from graspatlas.cluster.client import need
+from graspatlas.cluster.workers import check_workers
 from graspatlas.errors import GraspAtlasError
 from graspatlas.quality.evaluation import find_index
 from graspatlas.requirements.named import parse_requirement
@@ -130,6 +131,8 @@ def run_sweep(
     """
     folder = writable_folder(output)
     need("a sweep", "dask.distributed", "pyarrow.parquet")
+    if workers is not None or scheduler is not None:
+        check_workers("a sweep", workers, scheduler)
     for quality in qualities:
         find_index(quality)
     for text in require:
