@@ -82,7 +82,7 @@ def test_a_run_is_known_by_its_content() -> None:
     assert run.key != Run("planar_hand", {**problem, "length_scale": 0.2}, radius=0.2).key
 
 
-def test_a_mesh_that_was_saved_anew_makes_a_run_new(tmp_path: Path) -> None:
+def test_a_mesh_that_was_saved_anew_makes_a_run_new(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     stone, file = tmp_path / "stone.stl", tmp_path / "problem.json"
     trimesh.creation.box((0.02, 0.02, 0.02)).export(stone)
     problem = replace(ga.load_problem("planar_hand"), obstacles=(ga.Obstacle.mesh("stone", stone),))
@@ -94,6 +94,13 @@ def test_a_mesh_that_was_saved_anew_makes_a_run_new(tmp_path: Path) -> None:
     (after,) = runs_of(str(file), Run("", None), choices)
     assert after.problem == before.problem
     assert after.key != before.key
+
+    def denied(path: Path) -> bytes:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "read_bytes", denied)
+    (unread,) = runs_of(str(file), Run("", None), choices)
+    assert "cannot be read: [Errno 13] Permission denied" in unread.error
 
 
 @pytest.mark.slow
@@ -155,6 +162,11 @@ def test_wrong_input_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         run_sweep(["planar_hand"], tmp_path, qualities=["beauty"])
     with pytest.raises(ga.GraspAtlasError, match="at least one problem"):
         run_sweep([], tmp_path)
+    for workers in (0, -1):
+        with pytest.raises(ga.GraspAtlasError, match=f"workers must be .* got {workers}"):
+            run_sweep(["planar_hand"], tmp_path, workers=workers)
+    with pytest.raises(ga.GraspAtlasError, match="workers of this machine or the address of a scheduler, not both"):
+        run_sweep(["planar_hand"], tmp_path, workers=1, scheduler="tcp://127.0.0.1:1")
     with pytest.raises(ga.GraspAtlasError, match="no Dask scheduler answers"):
         run_sweep(["planar_hand"], tmp_path, scheduler="tcp://127.0.0.1:1")
     (tmp_path / ROWS).write_bytes(b"not a table")

@@ -47,11 +47,17 @@ def meshes_digest(bodies: Iterable[Body]) -> str:
     Args:
         bodies: The bodies; files that are not there are passed over.
 
-    Returns:
-        Nothing where there are no files.
+    Raises:
+        GraspAtlasError: If a file cannot be read.
     """
-    digests = [hashlib.sha256(path.read_bytes()).digest() for body in bodies for path in _paths(body)]
-    return hashlib.sha256(b"".join(digests)).hexdigest() if digests else ""
+    digest = hashlib.sha256()
+    for body in bodies:
+        for path in _paths(body):
+            try:
+                digest.update(hashlib.sha256(path.read_bytes()).digest())
+            except OSError as error:
+                raise _unreadable(path, body.name, error) from None
+    return digest.hexdigest()
 
 
 def _paths(body: Body) -> list[Path]:
@@ -70,11 +76,15 @@ def _path(name: str, folders: tuple[str, ...]) -> Path | None:
     return next((place for place in places if is_file(place)), None)
 
 
+def _unreadable(path: Path, body: str, error: Exception) -> GraspAtlasError:
+    return GraspAtlasError(f"mesh '{path}' of '{body}' cannot be read: {error}")
+
+
 def _check(body: str, path: Path) -> None:
     try:
         corners = mesh_corners(path)
     except (OSError, ValueError) as error:
-        raise GraspAtlasError(f"mesh '{path}' of '{body}' cannot be read: {error}") from None
+        raise _unreadable(path, body, error) from None
     if corners is None:
         return
     sound = (np.abs(corners) < LARGEST).all(axis=1)

@@ -43,8 +43,7 @@ class RoundFolder:
         self.folder = stated_path(folder, "keep a checkpoint at")
         stated = {field.name: getattr(plan, field.name) for field in fields(plan) if field.name != "threads"}
         stated["problem"] = plan.problem.to_dict()
-        if meshes := meshes_digest(plan.problem.bodies):
-            stated["meshes"] = meshes
+        stated["meshes"] = meshes_digest(plan.problem.bodies)
         stated["quality"] = quality_name(plan.quality)
         stated["requirements"] = [_stated(requirement) for requirement in plan.requirements]
         # Functions that share a name differ in what they say of a grasp.

@@ -27,7 +27,7 @@ class Run:
         problem: The problem as plain data; None when it could not be loaded.
         error: Why it could not be loaded; empty otherwise.
         dimension, radius, epsilon, quality, require, refine, max_charts, max_seconds: See :func:`graspatlas.optimize`.
-        meshes: Digest of the mesh files that the problem names, if any.
+        meshes: Digest of the mesh files that the problem names.
     """
 
     file: str
@@ -47,8 +47,6 @@ class Run:
     def key(self) -> str:
         """Digest of the problem and the options, by which a finished run is known again."""
         content = {**asdict(self), "file": self.file if self.problem is None else ""}
-        if not self.meshes:
-            del content["meshes"]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
     def row(self, **values: object) -> Row:
@@ -63,10 +61,11 @@ def runs_of(file: str, fixed: Run, choices: Sequence[Sequence[int | float | str 
     """The runs of one problem; a problem that cannot be loaded has one, which says so."""
     try:
         problem = load_problem(file)
+        meshes = meshes_digest(problem.bodies)
     except GraspAtlasError as error:
         yield replace(fixed, file=file, error=str(error))
         return
-    data, meshes = problem.to_dict(), meshes_digest(problem.bodies)
+    data = problem.to_dict()
     for choice in choices:
         names = ("dimension", "radius", "epsilon", "quality")
         options: dict[str, Any] = {

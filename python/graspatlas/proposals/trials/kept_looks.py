@@ -20,7 +20,7 @@ from graspatlas.storage.run_files import damaged, read_run_file, write_run_file
 __all__ = ["KeptLooks"]
 
 #: Changes when a look of an older version would not be the same.
-VERSION = 3
+VERSION = 2
 _KINDS = {"end": "U", "why": "U", "lack": "U", "value": "f", "x": "f", "postures": "f"}
 
 
